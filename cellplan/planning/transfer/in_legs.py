@@ -9,28 +9,25 @@ that carry them stand at its ends, not on how long it takes: a leg that is refus
 those robots go the same way.
 """
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import pairwise
 from typing import Final, Self
 
 import numpy as np
 
-from cellplan.certify.certify import certify
-from cellplan.certify.run_pairs import rows_moved_by, scene_of_rows
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.model.robot.robot import BASE
 from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
-from cellplan.planning.transfer.straight_time import straight_line, straight_steps
-from cellplan.scene.pairs import ScenePair
-from cellplan.scene.scene import Scene
+from cellplan.planning.transfer.straight_moves import StraightMoves
+from cellplan.planning.transfer.straight_time import straight_steps
 
 LEGS: Final = 3
 BACK: Final = (0.3, 0.6, 1.0)  # [-] shares of the way home that a robot backs off
 MOST_REFUSED: Final = 60  # legs that are refused before none is looked for any more
-NEARER: Final = 1e-5  # [m] than it may be that a pair is in rows that are not certified: rounding of quick distances
 MOST_COMBINATIONS: Final = 2_000_000  # of the routes of all robots that are compared
 CORNERED: Final = 2  # joints of a positioner that goes joint by joint
 START, GOAL = 0, 1  # places of a robot among those at which it may stand between two legs
@@ -68,38 +65,68 @@ class RobotRoutes:
         return np.array([(at[route[leg]], at[route[leg + 1]]) == ends for route in self.routes.tolist()])
 
 
-def legs_of(query: TransferQuery, retimer: Retimer, tried: Tried) -> list[Array]:
+class RouteChoices:
+    """Choices of a route for every robot that moves, with the steps that they take together."""
+
+    def __init__(
+        self, query: TransferQuery, retimer: Retimer, blocked: Collection[str], refused: Iterable[Mapping[str, Ends]]
+    ) -> None:
+        """Robots that are blocked have more routes; choices with refused ends of a leg are left out."""
+        self._query = query
+        self._routes = {name: _routes_of(query, name, retimer, is_blocked=name in blocked) for name in query.movers}
+        shape = [len(robot.routes) for robot in self._routes.values()]
+        self._steps = np.full(shape if math.prod(shape) <= MOST_COMBINATIONS else [0], 0.0)
+        for leg in range(LEGS if self._steps.size else 0):
+            self._steps += reduce(np.maximum, np.ix_(*(robot.steps[:, leg] for robot in self._routes.values())))
+        for ends in refused:
+            self.refuse(ends)
+
+    def refuse(self, ends: Mapping[str, Ends]) -> None:
+        """Leave out choices in which some robots have given ends in a leg."""
+        for leg in range(LEGS if self._steps.size else 0):
+            routes = (
+                np.flatnonzero(robot.going(leg, ends[name])) if name in ends else np.arange(len(robot.routes))
+                for name, robot in self._routes.items()
+            )
+            self._steps[np.ix_(*routes)] = np.inf
+
+    def fastest(self) -> list[Array] | None:
+        """Stacked configurations at the ends of the legs of the fastest choice; None where none is left."""
+        if not np.isfinite(self._steps).any():
+            return None
+        best = np.unravel_index(int(np.argmin(self._steps)), self._steps.shape)
+        stops = np.tile(self._query.start, (LEGS + 1, 1))
+        for (name, robot), choice in zip(self._routes.items(), best, strict=True):
+            stops[:, self._query.scene.cell.columns(name)] = robot.stops[robot.routes[choice]]
+        return [stops[0], *(q for before, q in pairwise(stops) if not np.array_equal(before, q))]
+
+
+def legs_of(query: TransferQuery, retimer: Retimer, tried: Tried, moves: StraightMoves) -> list[Array]:
     """Stacked configurations at the ends of the legs of the fastest free move, shape (nq,) each; none where none is.
 
     Args:
         query: Who moves from where to where.
         retimer: The limits of all joints and the step of the rows.
         tried: Receives the legs that were refused.
+        moves: Verdicts on straight moves in the scene of the query.
     """
-    moved = sorted({row for name in query.movers for row in rows_moved_by(query.scene, name)})
-    scene, refused = scene_of_rows(query.scene, moved), list[Mapping[str, Ends]]()
-    blocked: set[str] = set()
-    free: set[bytes] = set()
-    while tried.legs < MOST_REFUSED:
-        routes = {name: _routes_of(query, name, retimer, is_blocked=name in blocked) for name in query.movers}
-        if np.prod([float(len(it.routes)) for it in routes.values()]) > MOST_COMBINATIONS:
-            return []
-        ends = _fastest(query, routes, refused)
-        if ends is None:
-            return []
+    refused, blocked = list[Mapping[str, Ends]](), set[str]()
+    choices = RouteChoices(query, retimer, blocked, refused)
+    while tried.legs < MOST_REFUSED and (ends := choices.fastest()) is not None:
+        carriers = None
         for a, b in pairwise(ends):
-            line = straight_line(a, b)
-            if (key := line[[0, -1]].tobytes()) in free:
-                continue
-            if (carriers := refusing_robots(scene, line, query.movers)) is not None:
-                tried.legs += 1
-                columns = {name: query.scene.cell.columns(name) for name in carriers}
+            if (carriers := moves.refusing(a, b, query.movers)) is not None:
+                columns = {name: query.scene.cell.columns(name) for name in sorted(carriers)}
                 refused.append({name: (a[at].tobytes(), b[at].tobytes()) for name, at in columns.items()})
-                blocked |= carriers
                 break
-            free.add(key)
-        else:
+        if carriers is None:
             return ends
+        tried.legs += 1
+        if carriers <= blocked:
+            choices.refuse(refused[-1])
+        else:
+            blocked |= carriers
+            choices = RouteChoices(query, retimer, blocked, refused)
     return []
 
 
@@ -111,39 +138,9 @@ def least_steps(query: TransferQuery, retimer: Retimer, refused: Mapping[str, En
         retimer: The limits of all joints and the step of the rows.
         refused: Ends of the move of those robots.
     """
-    routes = {name: _routes_of(query, name, retimer, is_blocked=name in refused) for name in query.movers}
-    ends = _fastest(query, routes, [refused])
+    ends = RouteChoices(query, retimer, set(refused), [refused]).fastest()
     at = np.array([query.start, query.goal] if ends is None else ends)
     return int(straight_steps(at[:-1], at[1:], retimer.bounds, retimer.step).sum())
-
-
-def refusing_robots(scene: Scene, line: Array, movers: tuple[str, ...]) -> set[str] | None:
-    """Robots that carry the bodies of a pair that comes too near along a line; None where none does.
-
-    Args:
-        line: Stacked joint positions in [rad] or [m], shape (N, nq).
-        movers: The robots that move, of which some are named.
-    """
-    at_fault = _too_near(scene, line)
-    if not at_fault:
-        bound = certify(scene, line, with_minimum=False)
-        if bound.is_met:
-            return None
-        at_fault = [pair.pair for pair in bound.pairs if pair.touches or pair.unproved or pair.distance < pair.demand]
-    carriers = [
-        {body.robot for body in (scene.bodies[pair.first], scene.bodies[pair.second]) if body.link != BASE}
-        for pair in at_fault
-    ]
-    named = [names for one in carriers if (names := {name for name in one if name in movers})]
-    return min(named, key=lambda names: (len(names), sorted(names)), default=set(movers))
-
-
-def _too_near(scene: Scene, line: Array) -> list[ScenePair]:
-    """Pairs that are too near in the rows of a line already, which takes less than a certificate to see."""
-    demands = np.array([pair.least_distance for pair in scene.pairs])
-    near = scene.near(line, float(demands.max(initial=0.0)))
-    rows = np.unique(near.rows[near.distances < demands[near.rows] - NEARER])
-    return [scene.pairs[row] for row in rows.tolist()]
 
 
 def _routes_of(query: TransferQuery, name: str, retimer: Retimer, *, is_blocked: bool) -> RobotRoutes:
@@ -171,36 +168,3 @@ def _corners(start: Array, goal: Array, home: Array | None) -> list[Array]:
     if len(start) == CORNERED:
         places += [np.array([goal[0], start[1]]), np.array([start[0], goal[1]])]
     return [place for place in places if np.any(place != start) and np.any(place != goal)]
-
-
-def _fastest(
-    query: TransferQuery, routes: Mapping[str, RobotRoutes], refused: list[Mapping[str, Ends]]
-) -> list[Array] | None:
-    """Stacked configurations at the ends of the legs of the fastest move that is not refused; None where all are."""
-    total = np.zeros([len(it.routes) for it in routes.values()])
-    for leg in range(LEGS):
-        longest = np.zeros(total.shape, dtype=np.intp)
-        for axis, robot in enumerate(routes.values()):
-            longest = np.maximum(longest, np.expand_dims(robot.steps[:, leg], _other_axes(axis, len(routes))))
-        total += longest
-    for ends in refused:
-        for leg in range(LEGS):
-            going = [routes[name].going(leg, ends[name]) if name in ends else np.array(True) for name in routes]
-            is_refused = np.array(True)
-            for axis, flags in enumerate(going):
-                is_refused = is_refused & (
-                    np.expand_dims(flags, _other_axes(axis, len(routes))) if flags.ndim else flags
-                )
-            total[np.broadcast_to(is_refused, total.shape)] = np.inf
-    best = np.unravel_index(int(np.argmin(total)), total.shape)
-    if not np.isfinite(total[best]):
-        return None
-    stops = np.tile(query.start, (LEGS + 1, 1))
-    for (name, robot), choice in zip(routes.items(), best, strict=True):
-        stops[:, query.scene.cell.columns(name)] = robot.stops[robot.routes[choice]]
-    return [stops[0], *(q for before, q in pairwise(stops) if not np.array_equal(before, q))]
-
-
-def _other_axes(axis: int, count: int) -> tuple[int, ...]:
-    """All axes but one, to expand a vector along it."""
-    return tuple(other for other in range(count) if other != axis)

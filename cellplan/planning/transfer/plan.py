@@ -24,6 +24,7 @@ from cellplan.planning.transfer.in_time import InTime
 from cellplan.planning.transfer.in_turn import InTurn, RobotMove
 from cellplan.planning.transfer.query import STAGE, TransferQuery
 from cellplan.planning.transfer.reasons import Tried, blocked_error, require_free_ends
+from cellplan.planning.transfer.straight_moves import StraightMoves
 from cellplan.planning.transfer.straight_time import straight_line, straight_rows
 
 RESERVES: Final = (0.002, 0.006)  # [m] beyond the demand while planning; the larger where the certificate refuses
@@ -107,7 +108,7 @@ def plan_transfer(query: TransferQuery, *, retimer: Retimer, progress: Progress 
 
 def _in_legs(query: TransferQuery, retimer: Retimer, tried: Tried) -> PlannedTransfer | None:
     """Straight in several legs; None where no such move is free."""
-    ends = legs_of(query, retimer, tried)
+    ends = legs_of(query, retimer, tried, StraightMoves(query.scene))
     rungs = dict.fromkeys(query.movers, Rung.IN_LEGS)
     return _in_rows(query, _through_legs(ends, retimer), retimer, rungs) if ends else None
 

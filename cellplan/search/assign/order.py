@@ -6,21 +6,23 @@ takes as long as its slowest robot, or the part. Transfers that are not free str
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations, pairwise, permutations, product
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.search.assign.goals import TaskGoal
 from cellplan.search.assign.instance import End, Instance
 from cellplan.search.assign.schedule import BlockSchedule, in_order
+from cellplan.search.assign.table import Key
 
 MOST_PERMUTED: Final = 7  # stations of which all tours are compared
 CROWDED: Final = 10**6  # [steps] more than any cycle that is chosen
 TOURS: Final = 4  # shortest ones that are tried
+MOST_KNOWN: Final = 200  # pairs of blocks of which the transfers are kept, up to 1.5 MB each
 
-Layer = tuple[int | None, list[list[End | None]]]  # station, and the ends that each operator may choose
 Stop = tuple[int | None, tuple[End | None, ...]]  # station, and the end of each operator's task; None at home
 
 
@@ -32,6 +34,37 @@ class Refusal:
     after: Mapping[str, bytes]  # and go to
     stations: tuple[int | None, int | None]
     steps: int  # that it takes instead
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layer:
+    """What the operators may choose in a block."""
+
+    station: int | None  # None at home
+    ends: list[list[End | None]]  # by operator; None at home
+    leaving: list[Array]  # configurations in which each one leaves the block, shape (K, n) each
+    coming: list[Array]  # and comes to it
+    crowding: Indices  # steps that keep joint choices out in which two arcs come too near, an axis for each operator
+
+    @classmethod
+    def of(cls, instance: Instance, station: int | None, at_work: Mapping[str, str]) -> Self:
+        """The choices in a block.
+
+        Args:
+            at_work: Tasks by operator.
+        """
+        ends, leaving, coming = list[list[End | None]](), list[Array](), list[Array]()
+        for robot in instance.robots:
+            modes = instance.ends(at_work[robot], robot, station) if station is not None and robot in at_work else []
+            ends.append([*modes] or [None])
+            leaving.append(np.array([end.end for end in modes] or [instance.homes[robot]]))
+            coming.append(np.array([end.begin for end in modes] or [instance.homes[robot]]))
+        return cls(station=station, ends=ends, leaving=leaving, coming=coming, crowding=crowding(instance, ends))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of choices of each operator."""
+        return tuple(map(len, self.ends))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,22 +107,24 @@ class Sequencer:
 
     instance: Instance
     refusals: list[Refusal] = field(default_factory=list)
+    _layers: dict[frozenset[Key], Layer] = field(default_factory=dict)
+    _known: dict[tuple[Layer, Layer], tuple[int, Indices]] = field(default_factory=dict)  # and refusals in them
 
     def sequenced(self, schedule: BlockSchedule) -> SequencedBlocks:
         """The blocks in their order with the modes and directions that take least time."""
-        layers = [(None, self._at_home()), *self._layers(schedule), (None, self._at_home())]
+        layers = [self._at_home, *(self._layer(schedule, block) for block in schedule.blocks), self._at_home]
         cost, back, costs = np.zeros([1] * len(self.instance.robots), dtype=np.int64), [], []
         for before, after in pairwise(layers):
-            cost, came = self._step(cost, before, after)
-            cost += crowding(self.instance, after[1])
-            back.append(came)
+            total = self._transfers(before, after) + np.expand_dims(cost, tuple(range(cost.ndim, 2 * cost.ndim)))
+            total = total.reshape(-1, *after.shape)
+            cost = np.min(total, axis=0) + after.crowding
+            back.append(np.argmin(total, axis=0))
             costs.append(cost)
         stops, place, moved = list[Stop](), tuple([0] * len(self.instance.robots)), list[int]()
-        for came, cost, (station, ends) in zip(reversed(back), reversed(costs), reversed(layers[1:]), strict=True):
+        for came, cost, (before, after) in zip(back[::-1], costs[::-1], list(pairwise(layers))[::-1], strict=True):
             moved.append(int(cost[place]))
-            stops.append((station, tuple(choices[k] for choices, k in zip(ends, place, strict=True))))
-            shape = tuple(map(len, layers[len(back) - len(stops)][1]))
-            place = tuple(int(k) for k in np.unravel_index(came[place], shape))
+            stops.append((after.station, tuple(it[k] for it, k in zip(after.ends, place, strict=True))))
+            place = tuple(int(k) for k in np.unravel_index(came[place], before.shape))
         waits = waits_of(self.instance, schedule, moved[:0:-1])
         steps = schedule.work(self.instance) + moved[0] + sum(waits)
         return SequencedBlocks(schedule=schedule, stops=tuple(reversed(stops[1:])), steps=steps, waits=waits)
@@ -104,67 +139,53 @@ class Sequencer:
                 return best
             best = better
 
-    def _at_home(self) -> list[list[End | None]]:
-        return [[None] for _ in self.instance.robots]
+    @cached_property
+    def _at_home(self) -> Layer:
+        return Layer.of(self.instance, None, {})
 
-    def _layers(self, schedule: BlockSchedule) -> Iterator[Layer]:
-        """Station of each block, and the ends that each operator may have; None at home."""
-        for block in schedule.blocks:
+    def _layer(self, schedule: BlockSchedule, block: Sequence[str]) -> Layer:
+        """What the robots may choose in a block."""
+        keys = frozenset((task, *schedule.chosen[task]) for task in block)
+        if keys not in self._layers:
             at_work = {schedule.chosen[task][0]: task for task in block}
-            station = schedule.station_of(block)
-            ends: list[list[End | None]] = []
-            for robot in self.instance.robots:
-                task = at_work.get(robot)
-                ends.append([None] if task is None else [*self.instance.ends(task, robot, station)])
-            yield station, ends
+            self._layers[keys] = Layer.of(self.instance, schedule.station_of(block), at_work)
+        return self._layers[keys]
 
-    def _step(self, cost: Indices, before: Layer, after: Layer) -> tuple[Indices, Indices]:
-        """Least steps up to every joint choice of a layer, and the choice before it, flattened."""
-        (first, starts), (second, goals) = before, after
-        shape, rows = tuple(map(len, goals)), cost.size
-        total = np.full((rows, *shape), self.instance.station_steps(first, second), dtype=np.int64)
-        places = np.unravel_index(np.arange(rows), cost.shape)
+    def _transfers(self, before: Layer, after: Layer) -> Indices:
+        """Steps between every joint choice of two layers, shape (*before.shape, *after.shape)."""
+        count, steps = self._known.pop((before, after), (0, None))
+        if steps is None:
+            steps = self._straight(before, after)
+        for refusal in self.refusals[count:]:
+            if refusal.stations == (before.station, after.station):
+                self._refuse(steps, refusal, before, after)
+        self._known[before, after] = len(self.refusals), steps
+        if len(self._known) > MOST_KNOWN:
+            del self._known[next(iter(self._known))]
+        return steps
+
+    def _straight(self, before: Layer, after: Layer) -> Indices:
+        """Likewise, of transfers that are free straight."""
+        steps: Indices = np.zeros((*before.shape, *after.shape), dtype=np.int32)
+        steps += self.instance.station_steps(before.station, after.station)
         for axis, robot in enumerate(self.instance.robots):
-            a = np.array([self._leaving(robot, it) for it in starts[axis]])
-            b = np.array([self._coming(robot, it) for it in goals[axis]])
-            table = self.instance.transfer_steps(robot, a[:, None], b[None])
-            view = [1] * len(shape)
-            view[axis] = shape[axis]
-            total = np.maximum(total, table[places[axis]].reshape(rows, *view))
-        for refusal in self.refusals:
-            if refusal.stations == (first, second):
-                self._refuse(total, places, refusal, starts, goals)
-        total += cost.reshape(rows, *([1] * len(shape)))
-        came = np.argmin(total, axis=0)
-        return np.min(total, axis=0), came
+            table = self.instance.transfer_steps(robot, before.leaving[axis][:, None], after.coming[axis][None])
+            shape = [1] * steps.ndim
+            shape[axis], shape[axis + len(before.shape)] = table.shape
+            np.maximum(steps, table.reshape(shape), out=steps, casting="same_kind")
+        return steps
 
-    def _refuse(
-        self,
-        total: Indices,
-        places: Sequence[Indices],
-        refusal: Refusal,
-        starts: Sequence[Sequence[End | None]],
-        goals: Sequence[Sequence[End | None]],
-    ) -> None:
+    def _refuse(self, steps: Indices, refusal: Refusal, before: Layer, after: Layer) -> None:
         """Raise the steps of transfers that are refused, in place."""
-        rows, columns = np.ones(len(total), dtype=bool), np.ones(total.shape[1:], dtype=bool)
-        for axis, robot in enumerate(self.instance.robots):
-            if robot not in refusal.before:
-                continue
-            leaves = np.array([self._leaving(robot, it).tobytes() == refusal.before[robot] for it in starts[axis]])
-            comes = np.array([self._coming(robot, it).tobytes() == refusal.after[robot] for it in goals[axis]])
-            rows &= leaves[places[axis]]
-            view = [1] * columns.ndim
-            view[axis] = len(comes)
-            columns &= comes.reshape(view)
-        is_refused: Flags = rows.reshape(-1, *([1] * columns.ndim)) & columns
-        total[is_refused] = np.maximum(total[is_refused], refusal.steps)
-
-    def _leaving(self, robot: str, end: End | None) -> Array:
-        return self.instance.homes[robot] if end is None else end.end
-
-    def _coming(self, robot: str, end: End | None) -> Array:
-        return self.instance.homes[robot] if end is None else end.begin
+        places = [
+            np.array(
+                [place for place, q in enumerate(at) if ends.get(robot, q.tobytes()) == q.tobytes()], dtype=np.intp
+            )
+            for layer, ends in ((before.leaving, refusal.before), (after.coming, refusal.after))
+            for robot, at in zip(self.instance.robots, layer, strict=True)
+        ]
+        at = np.ix_(*places)
+        steps[at] = np.maximum(steps[at], refusal.steps)
 
     def relocations(self, schedule: BlockSchedule) -> Iterator[BlockSchedule]:
         """Schedules with one block at another place: of its station, or anywhere that may hide a rest of the part."""

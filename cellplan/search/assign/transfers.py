@@ -10,10 +10,11 @@ import numpy as np
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.geometry.arrays import Array
 from cellplan.planning.timing.retime import Retimer
-from cellplan.planning.transfer.in_legs import least_steps, legs_of, refusing_robots
+from cellplan.planning.transfer.in_legs import least_steps, legs_of
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
-from cellplan.planning.transfer.straight_time import straight_line, straight_steps
+from cellplan.planning.transfer.straight_moves import StraightMoves
+from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.instance import Instance
 from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop
@@ -44,11 +45,20 @@ class TransferCertifier:
     def __post_init__(self) -> None:
         """In transfers no tool is at work."""
         self.scene = scene_of_run(self.scene, ())
+        self._moves = StraightMoves(self.scene)
 
-    def settle(self, sequencer: Sequencer, schedule: BlockSchedule) -> SequencedBlocks:
-        """The best modes for an order of blocks in which no transfer is refused any more."""
+    def settle(
+        self, sequencer: Sequencer, schedule: BlockSchedule, *, below: SequencedBlocks | None = None
+    ) -> SequencedBlocks:
+        """The best modes for an order of blocks in which no transfer is refused any more.
+
+        Args:
+            below: Blocks in less time are looked for; as soon as that turns out to be in vain these are the result.
+        """
         for _ in range(MOST_SETTLED):
             best = sequencer.sequenced(schedule)
+            if below is not None and best.steps >= below.steps:
+                return below
             refusals = self.refusals(sequencer, best) or self._in_legs(sequencer, best)
             if not refusals:
                 return best
@@ -57,7 +67,10 @@ class TransferCertifier:
 
     def best(self, sequencer: Sequencer, schedule: BlockSchedule) -> SequencedBlocks:
         """The best order that is found with certified transfers: of short tours, then as ``shortened``."""
-        best = min((self.settle(sequencer, tour) for tour in sequencer.tours(schedule)), key=lambda it: it.steps)
+        first, *tours = sequencer.tours(schedule)
+        best = self.settle(sequencer, first)
+        for tour in tours:
+            best = self.settle(sequencer, tour, below=best)
         return self.shortened(sequencer, best, most=MOST_TRIED)
 
     def shortened(self, sequencer: Sequencer, best: SequencedBlocks, *, most: int) -> SequencedBlocks:
@@ -72,10 +85,7 @@ class TransferCertifier:
                 if tried == most:
                     return best
                 tried += 1
-                if (
-                    sequencer.sequenced(trial).steps < best.steps
-                    and (settled := self.settle(sequencer, trial)).steps < best.steps
-                ):
+                if (settled := self.settle(sequencer, trial, below=best)).steps < best.steps:
                     best = settled
                     break
             else:
@@ -96,7 +106,7 @@ class TransferCertifier:
         for query, _, key in self._transfers(sequencer, sequenced):
             if (refusal := self._known[key]) is not None and key not in self._timed:
                 self._timed.add(key)
-                legs = legs_of(query, self.retimer, Tried())
+                legs = legs_of(query, self.retimer, Tried(), self._moves)
                 steps = self._steps_of(legs) if legs else self._one_by_one(query)
                 refusals += [replace(refusal, steps=steps)] if steps > refusal.steps else []
         return refusals
@@ -117,7 +127,7 @@ class TransferCertifier:
         """The refusal of a transfer; None where it is free straight."""
         start, goal = query.start, query.goal
         self.examined += 1
-        carriers = refusing_robots(self.scene, straight_line(start, goal), query.movers) if query.movers else None
+        carriers = self._moves.refusing(start, goal, query.movers)
         if carriers is None:
             return None
         columns = {name: self.scene.cell.columns(name) for name in query.movers if name in carriers}

@@ -12,6 +12,7 @@ from cellplan.planning.transfer.in_legs import LEGS, legs_of
 from cellplan.planning.transfer.plan import Rung, plan_transfer
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
+from cellplan.planning.transfer.straight_moves import StraightMoves
 from cellplan.planning.transfer.straight_time import straight_line, straight_rows, straight_steps
 from cellplan.runs.plan.retiming import transfer_retimer
 from cellplan.scene.scene import Scene
@@ -49,7 +50,7 @@ def test_no_choice_of_legs_is_faster(seed: int) -> None:
     places = np.array([(x, y) for x in (-0.6, 0.0, 0.6) for y in (-0.5, 0.0, 0.5)])
     start, goal = (places[rng.permutation(9)[:3]].ravel() for _ in range(2))
 
-    ends = legs_of(TransferQuery.of(scene, start, goal, seed=0), transfer_retimer(scene), Tried())
+    ends = legs_of(TransferQuery.of(scene, start, goal, seed=0), transfer_retimer(scene), Tried(), StraightMoves(scene))
 
     best = fastest_by_enumeration(scene, start, goal)
     assert (steps_of(ends, scene) if ends else None) == best
@@ -98,5 +99,5 @@ def test_without_a_home_nobody_backs_off(in_the_way: tuple[Scene, TransferQuery]
     homeless = TransferQuery.of(scene, query.start, query.goal, seed=0)
     tried = Tried()
 
-    assert not legs_of(homeless, transfer_retimer(scene), tried)
+    assert not legs_of(homeless, transfer_retimer(scene), tried, StraightMoves(scene))
     assert tried.legs > 0
