@@ -29,8 +29,8 @@ class StraightMoves:
     def __init__(self, scene: Scene) -> None:
         """Nothing is known of any move."""
         self._scene = scene
-        self._kept_in_rows = dict[Move, bool]()
-        self._kept = dict[Move, bool]()
+        self._apart_in_rows = dict[Move, bool]()  # whether all of its pairs keep their distance there
+        self._certified = dict[Move, bool]()
 
     def refusing(self, start: Array, goal: Array, movers: Collection[str]) -> Carriers | None:
         """Robots that carry the bodies of a pair that comes too near in a straight move; None where none does.
@@ -41,13 +41,13 @@ class StraightMoves:
             movers: The robots of which some are named.
         """
         moves, line = self._moves(start, goal), straight_line(start, goal)
-        if any(move not in self._kept_in_rows for move in moves):
+        if any(move not in self._apart_in_rows for move in moves):
             near = {self._carriers[row] for row in self._too_near(line)}
-            self._kept_in_rows |= {move: move[0] not in near for move in moves}
-        at_fault = [move[0] for move in moves if not self._kept_in_rows[move]]
+            self._apart_in_rows |= {move: move[0] not in near for move in moves}
+        at_fault = [move[0] for move in moves if not self._apart_in_rows[move]]
         if not at_fault:
-            self._certify([move for move in moves if move not in self._kept], line)
-            at_fault = [move[0] for move in moves if not self._kept[move]]
+            self._certify([move for move in moves if move not in self._certified], line)
+            at_fault = [move[0] for move in moves if not self._certified[move]]
         named = [names for carriers in at_fault if (names := carriers.intersection(movers))]
         return min(named, key=lambda names: (len(names), sorted(names)), default=None)
 
@@ -97,5 +97,5 @@ class StraightMoves:
                 if it.touches or it.unproved or it.distance < it.demand
             }
             is_known = bound.is_met or not at_fault
-            self._kept |= {move: bound.is_met for move in moves if is_known or move[0] in at_fault}
-            moves = [move for move in moves if move not in self._kept]
+            self._certified |= {move: bound.is_met for move in moves if is_known or move[0] in at_fault}
+            moves = [move for move in moves if move not in self._certified]
