@@ -161,6 +161,12 @@ class TaskEntry(Entry):
         min_length=1,
         description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes holder_deg.",
     )
+    holder_moves: bool | None = Field(
+        default=None,
+        description="Whether the first holder moves while the task is done, from that configuration on, in the mode "
+        "semi_coordinated: as much of the motion as it can is its own, as the joint weights of the other robots count "
+        "a thousandfold. Tasks that begin together all have it or none. false when absent.",
+    )
     via: ViaEntry | None = Field(
         default=None,
         description="Configurations that its robot passes in the transfer moves to the task and from it; only with "

@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import Final
 
 from cellplan.errors import ImpossibleTasksError, NoSolutionError
+from cellplan.jobs.assign.columns import verified_columns
 from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.jobs.assign.written import mirrored_goals, written_cell, written_points
 from cellplan.model.cell.cell import Cell, Timing
@@ -22,11 +23,12 @@ from cellplan.runs.solution import Run, Solution
 from cellplan.runs.solve import solve
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.blocks import BlockAnswer, solve_blocks
-from cellplan.search.assign.clearance import AssignmentClearance
+from cellplan.search.assign.clearance import AssignmentClearance, ScenesByRobot
 from cellplan.search.assign.durations import with_stand_offs
-from cellplan.search.assign.goals import TaskGoal, task_goals
+from cellplan.search.assign.goals import Stations, TaskGoal, task_goals
 from cellplan.search.assign.greedy import greedy_schedule, improved
 from cellplan.search.assign.instance import Instance, find_conflicts, least_transfer, with_rules
+from cellplan.search.assign.moving_blocks import Column, MovingBlockSearch, with_columns
 from cellplan.search.assign.order import SequencedBlocks, Sequencer
 from cellplan.search.assign.refined import Refinement
 from cellplan.search.assign.rules import TaskRules, tasks_before
@@ -200,9 +202,11 @@ class _Search:
         progress("stations", 0.0)
         rules = TaskRules.of(cell)
         used, modes = choose_stations(table, goals, clearance, most=settings.most_stations, rules=rules)
-        refuse_impossible_tasks(draft, goals, table, {task for task, _, _ in modes})
+        columns = self._columns(goals, stations, progress) if settings.groups else []
+        able = {it.task for column in columns for it in column.modes} | {task for task, _, _ in modes}
+        refuse_impossible_tasks(draft, goals, table, able)
         progress("conflicts", 0.0)
-        columns = {robot.name: cell.columns(robot.name) for robot in cell.robots}
+        joints = {robot.name: cell.columns(robot.name) for robot in cell.robots}
         bounds = transfer_retimer(self._scene).bounds
         instance = Instance(
             goals={goal.name: self._timed(goal, modes) for goal in goals},
@@ -211,11 +215,11 @@ class _Search:
             stations=stations,
             used=used,
             conflicts=find_conflicts(modes, clearance),
-            homes={name: draft.home[at] for name, at in columns.items()},
-            bounds={name: bounds.of(at) for name, at in columns.items()},
+            homes={name: draft.home[at] for name, at in joints.items()},
+            bounds={name: bounds.of(at) for name, at in joints.items()},
             step=cell.motion.step,
         )
-        instance = with_rules(instance, rules)
+        instance = with_rules(with_columns(instance, columns), rules)
         self.counts = {
             "tasks": len(goals),
             "poses": len(stations.q),
@@ -223,8 +227,22 @@ class _Search:
             "stations": len(used),
             "free_modes": sum(map(len, modes.values())),
             "conflicts": len(instance.conflicts),
-        }
+        } | ({"moving_blocks": len(columns)} if settings.groups else {})
         return instance
+
+    def _columns(self, goals: Sequence[TaskGoal], stations: Stations, progress: Progress) -> list[Column]:
+        """Blocks in which the part moves, planned and verified."""
+        draft = self.draft
+        search = MovingBlockSearch(
+            cell=draft.cell,
+            goals=goals,
+            stations=stations,
+            spins=draft.spins(),
+            scenes=ScenesByRobot(self._scene),
+            home=draft.home,
+            conflict=draft.settings.conflict_mm.si,
+        )
+        return verified_columns(draft.cell, search, progress)
 
     def planned(self, instance: Instance, *, is_refined: bool) -> _Planned:
         """The best schedule of an instance, with certified transfers."""
@@ -367,7 +385,7 @@ def without_failed(instance: Instance, sequenced: SequencedBlocks, solution: Sol
                 modes[keys[0]] = left
             elif any(key[0] == keys[0][0] for key in modes if key != keys[0]):
                 del modes[keys[0]]
-    return replace(instance, modes=modes, conflicts=frozenset(conflicts))
+    return replace(instance, conflicts=frozenset(conflicts)).with_modes(modes)
 
 
 def _passed(run: Run) -> bool:

@@ -21,9 +21,10 @@ def written_cell(draft: AssignmentDraft, instance: Instance, sequenced: Sequence
     values: dict[str, object] = {}
     before: tuple[str, ...] = ()
     for block, (station, ends) in zip(sequenced.schedule.blocks, sequenced.stops, strict=True):
-        for robot, end in zip(instance.robots, ends, strict=True):
+        for end in ends:
             if end is not None:
-                values |= _task_values(draft.cell, robot, end, before, _holder(instance, station))
+                values |= task_values(draft.cell, end, before, _holder(instance, station))
+                values |= {f"tasks.{end.mode.task}.holder_moves": True} if station in instance.columns else {}
         before = block
     return draft.cell.with_values(values | order_values(sequenced, instance.step))
 
@@ -34,11 +35,14 @@ def _holder(instance: Instance, station: int | None) -> tuple[str, Array] | None
     return None if holder is None or station is None else (holder, instance.stations.q[station])
 
 
-def _task_values(
-    cell: Cell, robot: str, end: End, before: tuple[str, ...], holder: tuple[str, Array] | None
-) -> dict[str, object]:
-    """Values of one task by address."""
-    task = cell.task(end.mode.task)
+def task_values(cell: Cell, end: End, before: tuple[str, ...], holder: tuple[str, Array] | None) -> dict[str, object]:
+    """Values of one task by address.
+
+    Args:
+        before: Tasks of the block before.
+        holder: The holder of the part and its configuration; None for a part that is fixed.
+    """
+    task, robot = cell.task(end.mode.task), end.mode.robot
     place = f"tasks.{task.name}"
     values: dict[str, object] = {f"{place}.robot": robot}
     spin = float(np.round(np.degrees(np.remainder(task.spin + end.mode.spin + np.pi, 2.0 * np.pi) - np.pi), 9))

@@ -50,3 +50,8 @@ class AssignEntry(Entry):
     conflict_mm: Annotated[Mm, Within(ge=0.0, le=WIDEST_CONFLICT_MM)] = Field(
         default=Mm(50.0), description="Robots that would come nearer to each other than that are not at work together."
     )
+    groups: bool = Field(
+        default=False,
+        description="Whether the part may move while tasks are done whose paths run round the axis of the last joint "
+        "of its holder, equally fast: arcs and rings. Only with the mode semi_coordinated and times as written.",
+    )

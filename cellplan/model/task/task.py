@@ -226,6 +226,7 @@ class Task:
         start_posture: Configuration of its robot at its start in [rad] or [m], shape (n,); None for that of the robot
             if the task is its first one, and for one that is to be searched otherwise.
         holder_posture: Configuration of the first holder at its start, likewise; None for that holder's start posture.
+        holder_moves: Whether the first holder moves while it is done, in a program in which it rests otherwise.
         via_before: Configurations of its robot in [rad] or [m] that it passes in the transfer move to the task, shape
             (n,) each; None for its home.
         via_after: Likewise in the transfer move from it.
@@ -265,6 +266,7 @@ class Task:
     spin: float = 0.0
     start_posture: Array | None = None
     holder_posture: Array | None = None
+    holder_moves: bool = False
     via_before: tuple[Array | None, ...] = ()
     via_after: tuple[Array | None, ...] = ()
     origin: Origin = field(default_factory=Origin, compare=False, repr=False)

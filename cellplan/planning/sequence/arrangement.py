@@ -1,6 +1,6 @@
 """Arrangement of the tasks of a cell into blocks that are worked on one after another."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,7 +25,8 @@ def arrange(cell: Cell) -> tuple[Block, ...]:
 
     In every mode the orders of the robots, ``after`` and the marks hold, and a task comes as early as they allow.
     Pairwise has one task in each block, the first of the cell that may begin; semi-coordinated only tasks at one
-    configuration of the first holder, the present one as long as there are any for it.
+    configuration of the first holder, the present one as long as there are any for it; during all or none of them that
+    holder moves.
 
     Raises:
         InputError: A name does not exist or stands in the order of another robot, robots wait for one another in a
@@ -53,7 +54,7 @@ def _chosen(cell: Cell, ready: Sequence[Task], previous: Task | None) -> list[Ta
             return list(ready[:1])
         case Mode.SEMI_COORDINATED:
             groups = [
-                [task for task in ready if _same_configuration(cell, task, other)]
+                [task for task in ready if _same_configuration(cell, task, other) and _move_alike(task, other)]
                 for other in (previous, *ready)
                 if other
             ]
@@ -84,6 +85,11 @@ def _same_configuration(cell: Cell, one: Task, other: Task) -> bool:
     """Whether two tasks begin at the same configuration of the first holder."""
     a, b = (_holder_configuration(cell, task) for task in (one, other))
     return bool(np.array_equal(a, b)) if a is not None and b is not None else a is b
+
+
+def _move_alike(one: Task, other: Task) -> bool:
+    """Whether the first holder moves during two tasks, or rests during both."""
+    return one.holder_moves == other.holder_moves
 
 
 def _holder_configuration(cell: Cell, task: Task) -> Array | None:
@@ -205,8 +211,13 @@ def with_only_task(cell: Cell, name: str) -> Cell:
     chosen = next((task for task in cell.tasks if task.name == name), None)
     if chosen is None:
         raise InputError(f"task: expected one of {', '.join(task.name for task in cell.tasks)}, got '{name}'")
-    tasks: tuple[Task, ...] = (replace(chosen, after=()),)
-    left_out = {task.name for task in cell.tasks} - {name}
+    return with_tasks(cell, [name])
+
+
+def with_tasks(cell: Cell, names: Collection[str]) -> Cell:
+    """The cell with some of its tasks only, in the orders of its robots and after nothing else."""
+    tasks = tuple(replace(task, after=()) for task in cell.tasks if task.name in names)
+    left_out = {task.name for task in cell.tasks if task.name not in names}
     robots = (
         replace(robot, order=tuple(item for item in robot.order if item not in left_out)) for robot in cell.robots
     )

@@ -17,6 +17,7 @@ from cellplan.planning.sequence.arrangement import Block, arrange
 from cellplan.planning.sequence.part_moves import PartMove, part_lying, with_move
 
 HOME: Final = "home"
+LEADING: Final = 1e3  # times as much the weights of operators count where the holder moves: it does what it can
 AT_REST: Final = frozenset({Mode.PART_AT_REST, Mode.SEMI_COORDINATED})
 
 
@@ -110,6 +111,7 @@ def _cell_of_block(cell: Cell, block: Block, first: dict[str, str]) -> Cell:
     tasks = tuple(task for task in cell.tasks if task.name in block.tasks)
     by_robot = {task.robot: task for task in tasks}
     held_at = next((task.holder_posture for task in tasks if task.holder_posture is not None), None)
+    is_moving = any(task.holder_moves for task in tasks)
     robots = []
     for robot in cell.robots:
         start = robot.start if robot.home is None or robot.name in cell.positioners else robot.home
@@ -117,8 +119,9 @@ def _cell_of_block(cell: Cell, block: Block, first: dict[str, str]) -> Cell:
             start = task_start(robot, by_robot[robot.name], first)
         elif robot.name in cell.positioners[:1] and held_at is not None:
             start = held_at
-        robots.append(replace(robot, start=start))
-    mode = Mode.PART_AT_REST if cell.motion.mode in AT_REST else Mode.SIMULTANEOUS
+        is_led = is_moving and robot.name not in cell.positioners
+        robots.append(replace(robot, start=start, weights=robot.weights * (LEADING if is_led else 1.0)))
+    mode = Mode.PART_AT_REST if cell.motion.mode in AT_REST and not is_moving else Mode.SIMULTANEOUS
     return replace(cell, robots=tuple(robots), tasks=tasks, motion=replace(cell.motion, mode=mode))
 
 

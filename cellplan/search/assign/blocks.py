@@ -78,6 +78,7 @@ class _BlockModel:
         self._together()
         self._no_conflicts()
         self._cliques()
+        self._columns()
         self._in_order()
         add_rule_rows(self.model, instance, leads=self.leads, joins=self.joins, done=self._done)
         cost = sum(lead * (instance.steps(task) + least) for (task, _), lead in self.leads.items()) + self._tour(least)
@@ -176,6 +177,14 @@ class _BlockModel:
                     sum(it * steps(task) for task, it in leads) >= sum(it * steps(task) for task, it in done)
                 )
                 self.model.add(sum(it for _, it in leads) >= sum(it for _, it in done))
+
+    def _columns(self) -> None:
+        """The tasks of a column are done in one block, all or none."""
+        for station, keys in self.instance.columns.items():
+            first, *others = sorted(keys)
+            for key in others:
+                self.model.add(self.does[key] == self.does[first])
+            self.model.add(sum(it for (_, at), it in self.leads.items() if at == station) <= 1)
 
     def _in_order(self) -> None:
         """Tasks come in later blocks than those that they must follow."""

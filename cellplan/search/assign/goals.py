@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array, Flags
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.transforms import inverse
 from cellplan.measures.weld_position import torch_angles, weld_angles
 from cellplan.model.cell.cell import Cell, Timing
@@ -46,14 +46,26 @@ class Stations:
 
     holder: str | None  # robot that brings the part there; None where it is fixed
     q: Array  # configurations of the holder in [rad] or [m], shape (K, n); one without joints for a fixed part
-    X_WP: Array  # the part, shape (K, 4, 4)
+    X_WP: Array  # the part, shape (K, 4, 4), or (K, S + 2, 4, 4) where it moves along the poses of a task
+    q_end: Array | None = None  # configurations in which the holder leaves them; None for those in which it comes
+
+    @property
+    def left(self) -> Array:
+        """Configurations in which the holder leaves the stations, shape (K, n)."""
+        return self.q if self.q_end is None else self.q_end
+
+    def of_samples(self, places: Indices | slice = slice(None)) -> Array:
+        """The part at some stations, for one sample of a task or all, shape (K, 1, 4, 4) or (K, S + 2, 4, 4)."""
+        X_WP: Array = self.X_WP[places]
+        return X_WP[:, None] if X_WP.ndim == 3 else X_WP
 
     def allowed(self, goal: TaskGoal) -> dict[bool, Flags]:
         """Stations at which a task may be done as it is written, and backwards, as given and to gravity, shape (K,)."""
         is_given = np.ones(len(self.q), dtype=bool)
         if goal.holder_q is not None:
             is_given = np.all(np.abs(self.q - goal.holder_q) <= ROUNDING, axis=1)
-        X_WT = self.X_WP[:, None] @ goal.X_PT[None, 1:-1]
+        X_WP = self.of_samples()
+        X_WT = (X_WP @ goal.X_PT)[:, 1:-1]
         rows, samples = X_WT.shape[:2]
         torch = torch_angles(X_WT.reshape(-1, 4, 4)).reshape(rows, samples)
         is_upright = is_given & (
@@ -61,7 +73,7 @@ class Stations:
         )
         if goal.weld_position is None:
             return {False: is_upright, True: is_upright}
-        steps = np.gradient(X_WT[..., :3, 3], axis=1)
+        steps = np.gradient(X_WT[..., :3, 3], axis=1) if self.X_WP.ndim == 3 else self._along(goal)
         travel = (steps / np.linalg.norm(steps, axis=-1, keepdims=True)).reshape(-1, 3)
         is_allowed = {}
         for is_reversed, sign in ((False, 1.0), (True, -1.0)):
@@ -72,6 +84,12 @@ class Stations:
             ]
             is_allowed[is_reversed] = is_upright & np.all(np.logical_and(*keeps).reshape(rows, samples), axis=1)
         return is_allowed
+
+    def _along(self, goal: TaskGoal) -> Array:
+        """Steps along a path on a part that moves, as it lies meanwhile, in the world, shape (K, S, 3)."""
+        steps = np.gradient(goal.X_PT[1:-1, :3, 3], axis=0)[1:-1]  # at both ends those of the neighbours
+        inner = (self.X_WP[:, 2:-2, :3, :3] @ steps[..., None])[..., 0]
+        return np.concatenate([inner[:, :1], inner, inner[:, -1:]], axis=1)
 
     @classmethod
     def of(cls, cell: Cell, q: Array) -> "Stations":

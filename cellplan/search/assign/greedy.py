@@ -6,7 +6,7 @@ from itertools import combinations, product
 
 from cellplan.errors import NoSolutionError
 from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order
+from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order, keeps_columns
 
 
 def greedy_schedule(instance: Instance) -> BlockSchedule:
@@ -15,7 +15,7 @@ def greedy_schedule(instance: Instance) -> BlockSchedule:
     Raises:
         NoSolutionError: No choice of robots keeps the rules between tasks.
     """
-    instance, left = _settled(instance), set(instance.tasks)
+    instance, left = _settled(_at_rest(instance)), set(instance.tasks)
     blocks, chosen = list[tuple[str, ...]](), dict[str, Choice]()
     while left:
         station = max(instance.used, key=lambda it: (len(_here(instance, left, it)), -it))
@@ -36,12 +36,47 @@ def improved(instance: Instance, schedule: BlockSchedule) -> BlockSchedule:
     best, shortest = schedule, schedule.work(instance)
     while True:
         shorter = (it for it in _neighbours(instance, best) if it.work(instance) < shortest)
-        allowed = (it for it in shorter if instance.rules.hold_for(it.blocks, it.chosen))
+        whole = (it for it in shorter if keeps_columns(instance, it))
+        allowed = (it for it in whole if instance.rules.hold_for(it.blocks, it.chosen))
         ordered = ((it, in_order(it.blocks, instance.goals)) for it in allowed)
         better = next((replace(it, blocks=blocks) for it, blocks in ordered if blocks is not None), None)
         if better is None:
             return best
         best, shortest = better, better.work(instance)
+
+
+def _at_rest(instance: Instance) -> Instance:
+    """The instance without columns but those that tasks need which cannot be done on a part at rest.
+
+    Raises:
+        NoSolutionError: Some of these tasks have no columns of their own.
+    """
+    if not instance.columns:
+        return instance
+    resting = {task for task, _, at in instance.modes if at not in instance.columns}
+    needed = [task for task in instance.tasks if task not in resting]
+    chosen = _cover(needed, {at: {key[0] for key in keys} for at, keys in instance.columns.items()})
+    if chosen is None:
+        raise NoSolutionError(f"no choice of blocks in which the part moves has each task once: {', '.join(needed)}")
+    moving = {key[0] for station in chosen for key in instance.columns[station]}
+
+    def is_left(task: str, station: int) -> bool:
+        return station in chosen if task in moving else station not in instance.columns
+
+    return instance.with_modes({key: it for key, it in instance.modes.items() if is_left(key[0], key[2])})
+
+
+def _cover(needed: Sequence[str], columns: Mapping[int, set[str]]) -> list[int] | None:
+    """Stations of columns that have each of some tasks, and none twice, large ones first; None where none do."""
+    if not needed:
+        return []
+    for station in sorted(columns, key=lambda it: (-len(columns[it]), it)):
+        if needed[0] in columns[station]:
+            apart = {at: tasks for at, tasks in columns.items() if tasks.isdisjoint(columns[station])}
+            rest = _cover([task for task in needed if task not in columns[station]], apart)
+            if rest is not None:
+                return [station, *rest]
+    return None
 
 
 def _settled(instance: Instance) -> Instance:
@@ -97,6 +132,8 @@ def _here(instance: Instance, left: set[str], station: int) -> set[str]:
         for task in left
         if left.isdisjoint(instance.goals[task].after) and any(at == station for _, at in instance.options[task])
     }
+    if len(here) < len(instance.columns.get(station, ())):
+        return set()
     return here - {task for group in instance.rules.together if not here.issuperset(group) for task in group}
 
 
@@ -107,6 +144,8 @@ def _able(instance: Instance, task: str, station: int) -> list[str]:
 
 def _block(instance: Instance, station: int, here: set[str]) -> dict[str, str]:
     """One block: tasks that begin together, then a task for each robot, the ones with fewest tasks first."""
+    if station in instance.columns:
+        return {robot: task for task, robot, _ in sorted(instance.columns[station])}
     grouped = [group for group in instance.rules.together if here.issuperset(group)]
     block = {_able(instance, task, station)[0]: task for group in grouped[:1] for task in group}
     here = here - {task for group in grouped for task in group}

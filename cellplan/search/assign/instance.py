@@ -1,7 +1,7 @@
 """The instance that a schedule is made for: few stations, the free modes at them, times in whole steps, conflicts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations, product
 from typing import Self
@@ -51,6 +51,7 @@ class Instance:
     bounds: Mapping[str, JointLimitsInTime]  # limits of the joints by robot, likewise
     step: float  # time between two rows in [s]
     rules: TaskRules = TaskRules()  # noqa: RUF009 - frozen
+    columns: Mapping[int, frozenset[Key]] = field(default_factory=dict)  # tasks of blocks with moving parts, by station
 
     @cached_property
     def tasks(self) -> tuple[str, ...]:
@@ -73,9 +74,23 @@ class Instance:
     def without(self, robot: str) -> Self:
         """The same with a robot that does no task."""
         return replace(
-            self,
-            modes={key: modes for key, modes in self.modes.items() if key[1] != robot},
+            self.with_modes({key: modes for key, modes in self.modes.items() if key[1] != robot}),
             conflicts=frozenset(it for it in self.conflicts if all(key[1] != robot for key in it)),
+        )
+
+    def with_modes(self, modes: Mapping[Key, tuple[TaskMode, ...]]) -> Self:
+        """The same with other modes, without columns that lack a task then, or have a conflict."""
+        whole = {
+            station: keys
+            for station, keys in self.columns.items()
+            if keys <= modes.keys() and not any(it <= keys for it in self.conflicts)
+        }
+        broken = self.columns.keys() - whole.keys()
+        return replace(
+            self,
+            modes={key: it for key, it in modes.items() if key[2] not in broken},
+            used=tuple(it for it in self.used if it not in broken),
+            columns=whole,
         )
 
     def steps(self, task: str) -> int:
@@ -95,7 +110,8 @@ class Instance:
         holder = self.stations.holder
         if holder is None:
             return 0
-        a, b = (self.homes[holder] if it is None else self.stations.q[it] for it in (first, second))
+        a = self.homes[holder] if first is None else self.stations.left[first]
+        b = self.homes[holder] if second is None else self.stations.q[second]
         return int(self.transfer_steps(holder, a, b))
 
 
@@ -111,7 +127,7 @@ def with_rules(instance: Instance, rules: TaskRules) -> Instance:
         if first[0] != second[0] and first[1] != second[1] and first[2] == second[2]
         if (first[0], second[0]) in rules.lags or _are_crowded(rules, modes, first, second)
     }
-    return replace(instance, modes=modes, rules=rules, conflicts=instance.conflicts | apart)
+    return replace(instance, rules=rules, conflicts=instance.conflicts | apart).with_modes(modes)
 
 
 def _are_crowded(rules: TaskRules, modes: Mapping[Key, Sequence[TaskMode]], first: Key, second: Key) -> bool:

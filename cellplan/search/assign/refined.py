@@ -52,6 +52,8 @@ class Refinement:
         modes = dict(instance.modes)
         for task, (robot, station) in best.schedule.chosen.items():
             key = task, robot, station
+            if station in instance.columns:
+                continue
             more = list(modes[key])
             for mode in self._finer(key):
                 is_new = all(np.abs(mode.q[0] - other.q[0]).max() > 0.0 for other in more)
@@ -77,8 +79,8 @@ class Refinement:
     def _met(self, instance: Instance, sequenced: SequencedBlocks) -> dict[Key, tuple[TaskMode, ...]]:
         """Modes that are left of tasks whose robots would come too near each other in a block."""
         left: dict[Key, tuple[TaskMode, ...]] = {}
-        for _, ends in sequenced.stops:
-            modes = [end.mode for end in ends if end is not None]
+        for station, ends in sequenced.stops:
+            modes = [end.mode for end in ends if end is not None and station not in instance.columns]
             for first, second in combinations(modes, 2):
                 if self.clearance.meet(first, second):
                     for mode in (first, second):

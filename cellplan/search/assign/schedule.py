@@ -30,6 +30,12 @@ class BlockSchedule:
         return sum(max(instance.steps(task) for task in block) for block in self.blocks)
 
 
+def keeps_columns(instance: Instance, schedule: BlockSchedule) -> bool:
+    """Whether at the station of a column a block has its tasks, all of them and by the same robots."""
+    keys = ({(task, *schedule.chosen[task]) for task in block} for block in schedule.blocks)
+    return all(it == instance.columns.get(next(iter(it))[2], it) for it in keys)
+
+
 def in_order(blocks: Sequence[tuple[str, ...]], goals: Mapping[str, TaskGoal]) -> tuple[tuple[str, ...], ...] | None:
     """Blocks so that every task comes after those that it must follow, else as they are; None where no order does."""
     left, ordered = list(blocks), list[tuple[str, ...]]()
@@ -57,6 +63,8 @@ def refuse_impossible(instance: Instance, schedule: BlockSchedule) -> None:
         raise ValueError(f"expected every task once, got {done}")
     if not instance.rules.hold_for(schedule.blocks, schedule.chosen):
         raise ValueError("expected one robot for tasks of the same robot, and one block for those together")
+    if not keeps_columns(instance, schedule):
+        raise ValueError("expected all tasks of a column together, by its robots")
     for block in schedule.blocks:
         robots = [schedule.chosen[task][0] for task in block]
         if len(set(robots)) < len(robots) or len({schedule.chosen[task][1] for task in block}) > 1:

@@ -112,7 +112,7 @@ class ModeSearch:
         spins = self.spins if goal.is_spin_free else np.zeros(1)
         turns = np.tile(np.eye(4), (len(spins), 1, 1))
         turns[:, :3, :3] = rotation_about(np.array([0.0, 0.0, 1.0]), spins)
-        X = self.stations.X_WP[places, None, None] @ goal.X_PT[None, None] @ turns[None, :, None]
+        X = self.stations.of_samples(places)[:, None] @ goal.X_PT @ turns[None, :, None]
         result = follower.follow(X.reshape(-1, *X.shape[2:]))
         for name, rows in (("reach", result.reaches), ("joint limits", result.begins)):
             table.note(name, [goal.name] * int(rows.sum()))

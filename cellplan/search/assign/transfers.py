@@ -154,7 +154,8 @@ class TransferCertifier:
         (station, ends), q, cell = stop, self.home.copy(), self.scene.cell
         holder = sequencer.instance.stations.holder
         if station is not None and holder is not None:
-            q[cell.columns(holder)] = sequencer.instance.stations.q[station]
+            stations = sequencer.instance.stations
+            q[cell.columns(holder)] = (stations.left if leaves else stations.q)[station]
         for robot, end in zip(sequencer.instance.robots, ends, strict=True):
             if end is not None:
                 q[cell.columns(robot)] = end.end if leaves else end.begin

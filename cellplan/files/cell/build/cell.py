@@ -157,6 +157,7 @@ def build_task(
         after=entry.preceding,
         start_posture=_posture(entry.given_start, models, entry.robot),
         holder_posture=_posture(entry.given_holder, models, *(it.robot for it in document.part.held_by[:1])),
+        holder_moves=bool(entry.holder_moves),
         **_via_points(entry.via or ViaEntry(), models, entry.robot),
         origin=origin,
     )

@@ -17,7 +17,15 @@ from cellplan.model.settings.units import Mm
 
 STAND_OFF: Final = Mm(30.0)  # of the tools of a program where the cell gives none
 STAND_OFFS: Final = ("approach_mm", "retract_mm")
-TASK_KEYS: Final = ("after", "start_deg", "start", "holder_deg", "holder", "via")  # of tasks in a program
+TASK_KEYS: Final = (
+    "after",
+    "start_deg",
+    "start",
+    "holder_deg",
+    "holder",
+    "holder_moves",
+    "via",
+)  # of tasks in a program
 CURE: Final = "add program: {} for a program from home to home"
 
 
@@ -226,6 +234,9 @@ def _holding(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """The configuration of the holder is given only where a robot holds the part, and in tasks of other robots."""
     holders = [robot for _, robot in holders_as_written(document)]
     for name, task in valid.tasks.items():
+        if task.holder_moves and valid.motion is not None and valid.motion.mode != "semi_coordinated":
+            text = f"expected the mode semi_coordinated, in which the part rests otherwise, got {valid.motion.mode}"
+            yield document.key_finding(("tasks", name, "holder_moves"), text)
         holder = "holder_deg" if task.holder_deg is not None else "holder"
         if getattr(task, holder) is None:
             continue
