@@ -23,12 +23,12 @@ from cellplan.runs.solution import Run, Solution
 from cellplan.runs.solve import solve
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.blocks import BlockAnswer, solve_blocks
-from cellplan.search.assign.clearance import AssignmentClearance, ScenesByRobot
+from cellplan.search.assign.clearance import AssignmentClearance
 from cellplan.search.assign.durations import with_stand_offs
-from cellplan.search.assign.goals import Stations, TaskGoal, task_goals
+from cellplan.search.assign.goals import TaskGoal, task_goals
 from cellplan.search.assign.greedy import greedy_schedule, improved
 from cellplan.search.assign.instance import Instance, find_conflicts, least_transfer, with_rules
-from cellplan.search.assign.moving_blocks import Column, MovingBlockSearch, with_columns
+from cellplan.search.assign.moving_blocks import with_columns
 from cellplan.search.assign.order import SequencedBlocks, Sequencer
 from cellplan.search.assign.refined import Refinement
 from cellplan.search.assign.rules import TaskRules, tasks_before
@@ -202,7 +202,7 @@ class _Search:
         progress("stations", 0.0)
         rules = TaskRules.of(cell)
         used, modes = choose_stations(table, goals, clearance, most=settings.most_stations, rules=rules)
-        columns = self._columns(goals, stations, progress) if settings.groups else []
+        columns = verified_columns(draft, goals, self._scene, progress) if settings.groups else []
         able = {it.task for column in columns for it in column.modes} | {task for task, _, _ in modes}
         refuse_impossible_tasks(draft, goals, table, able)
         progress("conflicts", 0.0)
@@ -229,20 +229,6 @@ class _Search:
             "conflicts": len(instance.conflicts),
         } | ({"moving_blocks": len(columns)} if settings.groups else {})
         return instance
-
-    def _columns(self, goals: Sequence[TaskGoal], stations: Stations, progress: Progress) -> list[Column]:
-        """Blocks in which the part moves, planned and verified."""
-        draft = self.draft
-        search = MovingBlockSearch(
-            cell=draft.cell,
-            goals=goals,
-            stations=stations,
-            spins=draft.spins(),
-            scenes=ScenesByRobot(self._scene),
-            home=draft.home,
-            conflict=draft.settings.conflict_mm.si,
-        )
-        return verified_columns(draft.cell, search, progress)
 
     def planned(self, instance: Instance, *, is_refined: bool) -> _Planned:
         """The best schedule of an instance, with certified transfers."""

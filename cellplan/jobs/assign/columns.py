@@ -1,6 +1,7 @@
 """Columns: blocks in which the part moves, planned as ``solve`` plans them and kept where they pass every check."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -8,6 +9,7 @@ from cellplan.checks.verify import completed, verify_motion
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.files.run.joint_tables import parse_table
 from cellplan.geometry.arrays import Array
+from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.jobs.assign.written import task_values
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress
@@ -15,8 +17,9 @@ from cellplan.planning.sequence.arrangement import with_tasks
 from cellplan.runs.early_clearance import without_curves
 from cellplan.runs.plan.sequence import PlannedStage, plan_work
 from cellplan.runs.solve import render_program
-from cellplan.search.assign.clearance import spread_rows
-from cellplan.search.assign.goals import Stations
+from cellplan.scene.scene import Scene
+from cellplan.search.assign.clearance import ScenesByRobot, spread_rows
+from cellplan.search.assign.goals import Stations, TaskGoal
 from cellplan.search.assign.instance import End
 from cellplan.search.assign.moving_blocks import Candidate, Column, MovingBlockSearch
 
@@ -24,8 +27,24 @@ MOST_PLANNED: Final = 40  # candidates
 MOST_ALIKE: Final = 2  # columns of the same tasks by the same robots
 
 
-def verified_columns(cell: Cell, search: MovingBlockSearch, progress: Progress) -> list[Column]:
-    """Columns of one cell: first those of tasks that have fewest so far, of many tasks at once."""
+def verified_columns(
+    draft: AssignmentDraft, goals: Sequence[TaskGoal], scene: Scene, progress: Progress
+) -> list[Column]:
+    """Columns of one draft: first those of tasks that have fewest so far, of many tasks at once.
+
+    Args:
+        scene: The scene of its cell.
+    """
+    cell = draft.cell
+    search = MovingBlockSearch(
+        cell=cell,
+        goals=goals,
+        stations=draft.stations(),
+        spins=draft.spins(),
+        scenes=ScenesByRobot(scene),
+        home=draft.home,
+        conflict=draft.settings.conflict_mm.si,
+    )
     left, columns = search.candidates(), list[Column]()
     of_task, alike = Counter[str](), Counter[frozenset[tuple[str, str]]]()
     tried = set[frozenset[tuple[str, str, int, float]]]()

@@ -12,7 +12,7 @@ from cellplan.errors import InputError
 from cellplan.files.cell.load import load_open_cell
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell.cell import Cell, Mode, Robot
+from cellplan.model.cell.cell import Cell, Mode, Robot, Timing
 from cellplan.model.robot.robot import configuration_in_si, start_keys
 from cellplan.model.settings.assign import POSTURE_LIMIT, AssignEntry
 from cellplan.runs.plan.program_faults import refuse_crowded_homes
@@ -144,11 +144,18 @@ def refuse_unless_assignable(cell: Cell) -> None:
             f"{at('program')}: expected no marks, attach or detach, as an assignment orders all tasks itself"
         )
     for task in cell.tasks:
+        if task.holder_moves:
+            raise InputError(
+                f"{task.where('holder_moves')}: unexpected key, as an assignment chooses the blocks in which the part "
+                "moves: write assign.groups: true instead"
+            )
         if task.via_before or task.via_after:
             raise InputError(
                 f"{task.where('via')}: unexpected key, as an assignment reckons with straight moves from task to task: "
                 "add it to the cell that is written"
             )
+    if cell.assign is not None and cell.assign.groups:
+        _refuse_moving_blocks(cell)
     if len(cell.positioners) > 1:
         raise InputError(f"{at('part.held_by')}: expected one robot that holds the part, got {len(cell.positioners)}")
     for robot in cell.robots:
@@ -156,6 +163,17 @@ def refuse_unless_assignable(cell: Cell) -> None:
             raise InputError(f"{at(f'robots.{robot.name}')}: missing, expected home_deg, from which a program begins")
         if f"robots.{robot.name}.order" in cell.origin.lines:
             raise InputError(f"{at(f'robots.{robot.name}.order')}: unexpected key, write after in the tasks instead")
+
+
+def _refuse_moving_blocks(cell: Cell) -> None:
+    """Refuse cells in which the part cannot move while tasks are done."""
+    where = cell.origin.at("assign.groups")
+    if not cell.positioners:
+        raise InputError(f"{where}: unexpected key, no robot holds the part: remove it")
+    if cell.motion.mode is not Mode.SEMI_COORDINATED:
+        raise InputError(f"{where}: expected motion.mode: semi_coordinated, got {cell.motion.mode}")
+    if cell.motion.timing is not Timing.AS_WRITTEN:
+        raise InputError(f"{where}: expected motion.timing: as_written, got {cell.motion.timing}")
 
 
 def _start(holder: Robot) -> Array:

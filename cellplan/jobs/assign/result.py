@@ -29,6 +29,7 @@ SCHEMA: Final = "cellplan.assignment/1"
 HOLDS_FOR: Final = (
     "programs in blocks at the chosen poses of the part, with the modes that were found and the conflicts as listed"
 )
+MOVING: Final = "; of blocks in which the part moves, for those that were planned and passed all checks"
 NO_SOLVER: Final = "no lower bound is known, as OR-Tools is not installed: pip install 'cellplan[assign]'"
 OPEN_RESTS: Final = "no lower bound is known of a program that is retimed and in which the part cools between tasks"
 
@@ -81,7 +82,7 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
 def _holds_for(assignment: Assignment) -> str:
     """What the lower bound holds for, or why there is none."""
     if assignment.bound is not None:
-        return HOLDS_FOR
+        return HOLDS_FOR + (MOVING if assignment.draft.assign and assignment.draft.assign.groups else "")
     return OPEN_RESTS if has_open_rests(assignment.draft, assignment.instance) else NO_SOLVER
 
 
@@ -113,7 +114,7 @@ def _block(assignment: Assignment, place: int, run: Run, begin: float) -> dict[s
             for robot, end in zip(instance.robots, ends, strict=True)
             if end is not None
         },
-    }
+    } | ({"part_moves": True} if station in instance.columns else {})
 
 
 def _waits(robots: Sequence[str], blocks: Sequence[Record]) -> dict[str, dict[str, float]]:
@@ -199,7 +200,8 @@ def assign_lines(record: Record) -> list[str]:
         lines.append("  done by one robot alone: " + ", ".join(f"{task} ({robot})" for task, robot in only.items()))
     for block in record["blocks"]:
         tasks = ", ".join(f"{robot} {it['task']}" for robot, it in block["tasks"].items())
-        lines.append(f"  {block['phase']} {block['begin_s']:g} to {block['end_s']:g} s: {tasks}")
+        moves = ", the part moves" if "part_moves" in block else ""
+        lines.append(f"  {block['phase']} {block['begin_s']:g} to {block['end_s']:g} s: {tasks}{moves}")
     lines += [f"  nearly as good: {_alternative_words(other)}" for other in record["alternatives"]]
     lines += [f"  LEFT OUT {message}" for message in record["left_out"]]
     return [*lines, *(f"  FAILED {message}" for message in record["failed"])]

@@ -1,7 +1,7 @@
-"""Moving blocks: the holder's last joint turns the part while tools that hardly move work on it, several at a time.
+r"""Moving blocks: the holder's last joint turns the part while tools that hardly move work on it, several at a time.
 
 A path is coaxial with that joint where a tool that stands still follows it while the joint turns: the tool poses
-:math:`X_{PT}(s) = M(\\varphi(s))^{-1} X_{PT}(0)` with the motion M of the part by an angle of the joint. Tasks whose
+:math:`X_{PT}(s) = M(\varphi(s))^{-1} X_{PT}(0)` with the motion M of the part by an angle of the joint. Tasks whose
 angles are the same at all times can share one turn of the part. What is chosen here are candidates: how arms and holder
 really move follows from their redundancy.
 """

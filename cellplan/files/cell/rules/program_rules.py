@@ -17,15 +17,7 @@ from cellplan.model.settings.units import Mm
 
 STAND_OFF: Final = Mm(30.0)  # of the tools of a program where the cell gives none
 STAND_OFFS: Final = ("approach_mm", "retract_mm")
-TASK_KEYS: Final = (
-    "after",
-    "start_deg",
-    "start",
-    "holder_deg",
-    "holder",
-    "holder_moves",
-    "via",
-)  # of tasks in a program
+TASK_KEYS: Final = ("after", "start_deg", "start", "holder_deg", "holder", "holder_moves", "via")  # of a program
 CURE: Final = "add program: {} for a program from home to home"
 
 
