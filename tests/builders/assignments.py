@@ -8,6 +8,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.search.assign.goals import Stations, TaskGoal
 from cellplan.search.assign.instance import Instance, with_rules
+from cellplan.search.assign.moving_blocks import Column, with_columns
 from cellplan.search.assign.rules import TaskRules
 from cellplan.search.assign.table import TaskMode
 
@@ -16,7 +17,14 @@ ROBOTS = ("a", "b")
 
 
 def small_instance(
-    seed: int, count: int, *, stations: int = 2, modes: int = 1, chained: bool = False, rules: TaskRules | None = None
+    seed: int,
+    count: int,
+    *,
+    stations: int = 2,
+    modes: int = 1,
+    chained: bool = False,
+    rules: TaskRules | None = None,
+    columns: int = 0,
 ) -> Instance:
     """Tasks at chance places with chance conflicts.
 
@@ -24,6 +32,7 @@ def small_instance(
         modes: Number of modes of every robot for every task.
         chained: Whether the third task must follow the first, and the second the third.
         rules: What holds between the tasks beside that.
+        columns: Number of blocks of two tasks, one, two and so on, in which the part moves.
     """
     rng = np.random.default_rng(seed)
     names = [f"t{k}" for k in range(count)]
@@ -65,7 +74,15 @@ def small_instance(
         bounds={"a": limits, "b": limits, "table": slow},
         step=STEP,
     )
-    return with_rules(instance, rules or TaskRules())
+    moving = [_column(names, 1 + place % 2, rng) for place in range(columns)]
+    return with_rules(with_columns(instance, moving), rules or TaskRules())
+
+
+def _column(names: list[str], size: int, rng: np.random.Generator) -> Column:
+    tasks, robots = rng.permutation(names)[:size].tolist(), rng.permutation(ROBOTS)[:size].tolist()
+    modes = tuple(_mode(task, robot, 0, rng) for task, robot in zip(tasks, robots, strict=True))
+    begin, end = rng.uniform(-1, 1, (2, 2))
+    return Column(modes=modes, begin=begin, end=end, X_WP=np.eye(4))
 
 
 def _mode(task: str, robot: str, station: int, rng: np.random.Generator) -> TaskMode:

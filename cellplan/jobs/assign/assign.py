@@ -28,7 +28,7 @@ from cellplan.search.assign.durations import with_stand_offs
 from cellplan.search.assign.goals import TaskGoal, task_goals
 from cellplan.search.assign.greedy import greedy_schedule, improved
 from cellplan.search.assign.instance import Instance, find_conflicts, least_transfer, with_rules
-from cellplan.search.assign.moving_blocks import with_columns
+from cellplan.search.assign.moving_blocks import joint_angles, with_columns
 from cellplan.search.assign.order import SequencedBlocks, Sequencer
 from cellplan.search.assign.refined import Refinement
 from cellplan.search.assign.rules import TaskRules, tasks_before
@@ -324,9 +324,11 @@ def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table
             counts: Mapping[str, int] = table.counts.get(goal.name, {})
             dropped = next((name for name in LOOKED_FOR if not counts.get(name)), LOOKED_FOR[-1])
             names = ", ".join(goal.robots)
+            turns = draft.may_move_part and not draft.settings.groups and joint_angles(draft.cell, goal) is not None
+            cure = "write assign.groups: true, so that the part turns meanwhile, or " if turns else ""
             lines.append(
                 f"{draft.cell.task(goal.name).where()}: none of {names} can do it at any pose of the part: nothing is "
-                f"left after the filter '{dropped}'; give more poses of the part, other robots or bases"
+                f"left after the filter '{dropped}'; {cure}give more poses of the part, other robots or bases"
             )
     if lines:
         raise ImpossibleTasksError(lines, [goal.name for goal in goals if goal.name not in able])

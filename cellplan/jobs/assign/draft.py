@@ -86,6 +86,11 @@ class AssignmentDraft:
         return tuple(robot.name for robot in self.cell.robots if robot.name not in self.cell.positioners)
 
     @property
+    def may_move_part(self) -> bool:
+        """Whether a robot holds the part that could turn it while tasks are done."""
+        return bool(self.cell.positioners) and self.cell.motion.mode is Mode.SEMI_COORDINATED
+
+    @property
     def home(self) -> Array:
         """Stacked homes of all robots in [rad] or [m], shape (nq,); the start of a holder without a home."""
         homes = [robot.home if robot.home is not None else robot.start for robot in self.cell.robots]

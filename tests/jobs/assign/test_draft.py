@@ -28,6 +28,17 @@ def draft(folder: Path, *changes: tuple[str, str]) -> AssignmentDraft:
         ("program: {}\n", "", "add program: {} for a program from home to home"),
         ("semi_coordinated", "simultaneous", "motion.mode: expected semi_coordinated or part_at_rest"),
         ("program: {}", "program: {detach: {at: {}}}", "program: expected no marks, attach or detach"),
+        ("robot: any", "robot: any\n    holder_moves: true", "tasks.top_1.holder_moves: unexpected key, as an assign"),
+        (
+            "semi_coordinated, step_s: 0.02}\nprogram: {}\nassign:",
+            "part_at_rest, step_s: 0.02}\nprogram: {}\nassign:\n  groups: true",
+            "assign.groups: expected motion.mode: semi_coordinated, got part_at_rest",
+        ),
+        (
+            "step_s: 0.02}\nprogram: {}\nassign:",
+            "step_s: 0.02, timing: fastest}\nprogram: {}\nassign:\n  groups: true",
+            "assign.groups: expected motion.timing: as_written, got fastest",
+        ),
         (HOME, "", "robots.west: missing, expected home_deg"),
         (HOME, HOME + "    order: [top_1, top_2, top_3, edge_1, edge_2, edge_3, side_1, side_2]\n", "west.order: unex"),
     ],

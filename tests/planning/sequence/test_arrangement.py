@@ -132,6 +132,23 @@ def test_a_posture_of_the_holder_is_kept_as_long_as_there_are_tasks_for_it():
     assert [block.tasks for block in arrange(cell)] == [("a", "c"), ("d",), ("b",), ("e",)]
 
 
+def test_tasks_during_which_the_holder_moves_have_blocks_of_their_own_and_it_leads_in_them() -> None:
+    cell = cell_of({"op0": "a d", "op1": "b", "op2": "c"}, mode=Mode.SEMI_COORDINATED)
+    tasks = tuple(replace(task, holder_moves=task.name in "bd") for task in cell.tasks)
+    cell = replace(cell, tasks=tasks)
+
+    blocks = [block.tasks for block in arrange(cell)]
+    stages = [stage for stage in program_stages(cell) if stage.phase.tasks]
+
+    assert blocks == [("a", "c"), ("b", "d")]
+    assert [stage.cell.motion.mode for stage in stages] == [Mode.PART_AT_REST, Mode.SIMULTANEOUS]
+    holder = cell.positioners[0]
+    assert [holder in stage.phase.moving for stage in stages] == [False, True]
+    for robot in cell.robots:
+        ratio = stages[1].cell.robot(robot.name).weights / stages[0].cell.robot(robot.name).weights
+        np.testing.assert_allclose(ratio, 1.0 if robot.name in cell.positioners else 1000.0, rtol=1e-12)
+
+
 def test_marks_hold_those_that_take_part_and_their_dwells_are_rests_of_all():
     cell = cell_of({"op0": "M a N b O", "op1": "M c d N", "op2": "e f g"}, marks={"M": 0.5, "N": 0.25, "O": 2.0})
 

@@ -83,6 +83,50 @@ def test_the_model_is_as_good_as_enumeration(seed: int, chained: bool) -> None:
     assert answer.bound == model_cycle(instance, answer.schedule) == best_by_enumeration(instance)
 
 
+@pytest.mark.parametrize("rules", [TaskRules(), TaskRules(together=(("t0", "t1"),))], ids=["free", "together"])
+def test_with_moving_parts_the_model_is_as_good_as_enumeration_and_some_columns_pay(rules: TaskRules) -> None:
+    """Columns are blocks of one or two tasks that begin and end at different configurations of the holder."""
+    pytest.importorskip("ortools")
+    shorter = 0
+    for seed in range(6):
+        instance = small_instance(seed, 4, chained=seed % 5 == 4, rules=rules, columns=5)
+
+        answer, best = solve_blocks(instance, least=LEAST, effort=10.0), best_by_enumeration(instance)
+
+        if best is None:
+            assert answer.schedule is None
+            continue
+        assert answer.schedule is not None
+        refuse_impossible(instance, answer.schedule)
+        assert answer.is_proved
+        assert answer.bound == model_cycle(instance, answer.schedule) == best
+        at_rest = best_by_enumeration(small_instance(seed, 4, chained=seed % 5 == 4, rules=rules))
+        assert at_rest is None or best <= at_rest
+        shorter += at_rest is None or best < at_rest
+    assert shorter > 0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_exchanges_keep_columns_whole(seed: int) -> None:
+    """Where tasks can be done on a moving part alone, the greedy schedule takes columns that have each of them once."""
+    instance = small_instance(seed, 6, columns=5)
+    moving = {task for keys in instance.columns.values() for task, _, _ in keys}
+    only = instance.with_modes(
+        {key: it for key, it in instance.modes.items() if key[2] in instance.columns or key[0] not in moving}
+    )
+
+    for it in (instance, only):
+        try:
+            greedy = greedy_schedule(it)
+        except NoSolutionError:
+            assert it is only
+            continue
+        refuse_impossible(it, greedy)
+        refuse_impossible(it, improved(it, greedy))
+        assert Sequencer(it).ordered(greedy).steps <= Sequencer(it).sequenced(greedy).steps
+    assert all(robot != "a" for keys in instance.without("a").columns.values() for _, robot, _ in keys)
+
+
 def lags(*pairs: tuple[str, str], steps: int) -> dict[tuple[str, str], int]:
     """Rests of the part, longer in one direction."""
     return {(a, b): steps + 7 * (a > b) for pair in pairs for a, b in (pair, pair[::-1])}

@@ -175,6 +175,18 @@ def test_a_part_that_nobody_holds_is_neither_gripped_nor_moved(refuse: Refuse) -
     ]
 
 
+def test_the_holder_moves_during_tasks_only_where_it_rests_otherwise(refuse: Refuse, load: Load) -> None:
+    key = "holder_moves: true"
+
+    assert refuse(*changes(second=key)) == [
+        "c:22: tasks.second.holder_moves: expected the mode semi_coordinated, in which the part rests otherwise, got "
+        "simultaneous"
+    ]
+    cell = load(*changes(second=key, motion=", mode: semi_coordinated"))
+    assert [task.holder_moves for task in cell.tasks] == [False, True]
+    assert "holder_moves: true" in render_cell(cell)
+
+
 def test_a_task_of_the_holder_begins_at_its_own_start(refuse: Refuse) -> None:
     turns = "holder_deg: [0, 0, 0, 0, 0, 0]\nrelative_to: world\naxes: [x]\ntool_axis: -z"
     program = changes(second=turns)
