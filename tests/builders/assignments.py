@@ -32,7 +32,7 @@ def small_instance(
         modes: Number of modes of every robot for every task.
         chained: Whether the third task must follow the first, and the second the third.
         rules: What holds between the tasks beside that.
-        columns: Number of blocks of two tasks, one, two and so on, in which the part moves.
+        columns: Number of blocks of two tasks, one, two and so on, in which the part moves; the first has two first.
     """
     rng = np.random.default_rng(seed)
     names = [f"t{k}" for k in range(count)]
@@ -74,7 +74,7 @@ def small_instance(
         bounds={"a": limits, "b": limits, "table": slow},
         step=STEP,
     )
-    moving = [_column(names, 1 + place % 2, rng) for place in range(columns)]
+    moving = [_column(names if place else names[:2], 2 - place % 2, rng) for place in range(columns)]
     return with_rules(with_columns(instance, moving), rules or TaskRules())
 
 

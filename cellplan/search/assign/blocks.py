@@ -203,6 +203,8 @@ class _BlockModel:
         instance, used = self.instance, {station: self._flag() for station in self.instance.used}
         for (_, _, station), it in self.does.items():
             self.model.add_implication(it, used[station])
+            if station in instance.columns:  # where none is done there, its two ends are no short cut
+                self.model.add_implication(used[station], it)
         places: Sequence[int | None] = (None, *instance.used)
         arcs, cost = [(place, place, used[at].negated()) for place, at in enumerate(places) if at is not None], []
         for i, first in enumerate(places):
