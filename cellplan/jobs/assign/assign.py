@@ -206,8 +206,7 @@ class _Search:
         able = {it.task for column in columns for it in column.modes} | {task for task, _, _ in modes}
         refuse_impossible_tasks(draft, goals, table, able)
         progress("conflicts", 0.0)
-        joints = {robot.name: cell.columns(robot.name) for robot in cell.robots}
-        bounds = transfer_retimer(self._scene).bounds
+        joints, bounds = {it.name: cell.columns(it.name) for it in cell.robots}, transfer_retimer(self._scene).bounds
         instance = Instance(
             goals={goal.name: self._timed(goal, modes) for goal in goals},
             robots=draft.operators,

@@ -9,7 +9,7 @@ with the durations d and the least transfer :math:`\tau`. At each station the le
 the tasks of any clique, which makes the bound.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, Final
@@ -19,6 +19,7 @@ from cellplan.search.assign.instance import Instance
 from cellplan.search.assign.rule_rows import add_rest_rows, add_rule_rows
 from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order
 from cellplan.search.assign.solver import Solved, new_model
+from cellplan.search.assign.table import Key
 
 MOST_OTHERS: Final = 3  # schedules that are nearly as good
 HORIZON: Final = 10_000_000  # [steps] no cycle is longer
@@ -78,7 +79,7 @@ class _BlockModel:
         self._together()
         self._no_conflicts()
         self._cliques()
-        self._columns()
+        _add_column_rows(self.model, instance, self.does, self.leads)
         self._in_order()
         add_rule_rows(self.model, instance, leads=self.leads, joins=self.joins, done=self._done)
         cost = sum(lead * (instance.steps(task) + least) for (task, _), lead in self.leads.items()) + self._tour(least)
@@ -178,14 +179,6 @@ class _BlockModel:
                 )
                 self.model.add(sum(it for _, it in leads) >= sum(it for _, it in done))
 
-    def _columns(self) -> None:
-        """The tasks of a column are done in one block, all or none."""
-        for station, keys in self.instance.columns.items():
-            first, *others = sorted(keys)
-            for key in others:
-                self.model.add(self.does[key] == self.does[first])
-            self.model.add(sum(it for (_, at), it in self.leads.items() if at == station) <= 1)
-
     def _in_order(self) -> None:
         """Tasks come in later blocks than those that they must follow."""
         tasks = self.instance.tasks
@@ -216,3 +209,12 @@ class _BlockModel:
                     cost.append(goes * max(instance.station_steps(first, second) - counted, 0))
         self.model.add_circuit(arcs)
         return sum(cost)
+
+
+def _add_column_rows(model: Any, instance: Instance, does: Mapping[Key, Any], leads: Mapping[Any, Any]) -> None:
+    """The tasks of a column are done in one block, all or none."""
+    for station, keys in instance.columns.items():
+        first, *others = sorted(keys)
+        for key in others:
+            model.add(does[key] == does[first])
+        model.add(sum(it for (_, at), it in leads.items() if at == station) <= 1)

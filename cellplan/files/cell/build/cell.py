@@ -122,7 +122,6 @@ def build_task(
     """The task of one operator; settings that it does not state are those of the motion."""
     entry, motion = document.tasks[name], document.motion
     (tool_axis, tool_x), process = tool_directions(entry), entry.process
-    law = _time_law(entry.time_law or motion.time_law) if process is None else TimeLaw(kind=TimeLawKind.STEADY)
     return Task(
         name=name,
         robot=entry.robot,
@@ -139,7 +138,7 @@ def build_task(
         start=entry.begins_s,
         duration=entry.duration_s,
         feed=si_or_none(entry.feed_mm_s) if process is None else process.feed_mm_s.si,
-        time_law=law,
+        time_law=_time_law(entry.time_law or motion.time_law) if process is None else TimeLaw(kind=TimeLawKind.STEADY),
         blend=_blend(entry.corners or motion.corners),
         settle=entry.settle_s,
         repeat=entry.repeat,
