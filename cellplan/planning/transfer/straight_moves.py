@@ -14,6 +14,7 @@ from cellplan.planning.transfer.straight_time import straight_line
 from cellplan.scene.scene import Scene
 
 NEARER: Final = 1e-5  # [m] than it may be that a pair is in rows that are not certified: rounding of quick distances
+LOOKED_AT: Final = 4  # [rows] between two that are examined before all are certified
 
 Carriers = frozenset[str]  # robots that carry the bodies of a pair
 Move = tuple[Carriers, bytes]  # with their configurations at both ends
@@ -42,7 +43,7 @@ class StraightMoves:
         """
         moves, line = self._moves(start, goal), straight_line(start, goal)
         if any(move not in self._apart_in_rows for move in moves):
-            near = {self._carriers[row] for row in self._too_near(line)}
+            near = {self._carriers[row] for row in self._too_near(line[::LOOKED_AT])}
             self._apart_in_rows |= {move: move[0] not in near for move in moves}
         at_fault = [move[0] for move in moves if not self._apart_in_rows[move]]
         if not at_fault:
@@ -76,7 +77,7 @@ class StraightMoves:
         return moves
 
     def _too_near(self, line: Array) -> list[int]:
-        """Pairs that are too near in the rows already, which takes less than a certificate to see."""
+        """Pairs that are too near in some rows already, which takes less than a certificate to see."""
         demands = self._demands
         near = self._scene.near(line, float(demands.max(initial=0.0)))
         rows: list[int] = np.unique(near.rows[near.distances < demands[near.rows] - NEARER]).tolist()

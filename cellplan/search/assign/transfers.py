@@ -21,7 +21,7 @@ from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, St
 from cellplan.search.assign.schedule import BlockSchedule, refuse_impossible
 
 MOST_TRIED: Final = 400  # orders of blocks, and tasks exchanged between them
-MOST_SETTLED: Final = 200  # choices of modes until no transfer of the best one is newly refused
+MOST_SETTLED: Final = 30  # choices of modes until no transfer of the best one is newly refused
 
 
 @dataclass(eq=False)
@@ -55,6 +55,7 @@ class TransferCertifier:
         Args:
             below: Blocks in less time are looked for; as soon as that turns out to be in vain these are the result.
         """
+        trials = list[SequencedBlocks]()
         for _ in range(MOST_SETTLED):
             best = sequencer.sequenced(schedule)
             if below is not None and best.steps >= below.steps:
@@ -63,7 +64,10 @@ class TransferCertifier:
             if not refusals:
                 return best
             sequencer.refusals += refusals
-        return sequencer.sequenced(schedule)
+            trials.append(self._as_known(sequencer, best))
+        best = min(trials, key=lambda it: it.steps)
+        self._in_legs(sequencer, best)
+        return min([self._as_known(sequencer, best), *([below] if below else [])], key=lambda it: it.steps)
 
     def best(self, sequencer: Sequencer, schedule: BlockSchedule) -> SequencedBlocks:
         """The best order that is found with certified transfers: of short tours, then as ``shortened``."""
@@ -108,8 +112,17 @@ class TransferCertifier:
                 self._timed.add(key)
                 legs = legs_of(query, self.retimer, Tried(), self._moves)
                 steps = self._steps_of(legs) if legs else self._one_by_one(query)
-                refusals += [replace(refusal, steps=steps)] if steps > refusal.steps else []
+                self._known[key] = replace(refusal, steps=max(steps, refusal.steps))
+                refusals += [self._known[key]] if steps > refusal.steps else []
         return refusals
+
+    def _as_known(self, sequencer: Sequencer, sequenced: SequencedBlocks) -> SequencedBlocks:
+        """A sequence with the steps that it takes by all that is known of its transfers."""
+        steps = sequenced.schedule.work(sequencer.instance) + sum(sequenced.waits)
+        for query, _, key in self._transfers(sequencer, sequenced):
+            refusal = self._known[key]
+            steps += max(self._steps_of([query.start, query.goal]), 0 if refusal is None else refusal.steps)
+        return replace(sequenced, steps=steps)
 
     def _transfers(
         self, sequencer: Sequencer, sequenced: SequencedBlocks
