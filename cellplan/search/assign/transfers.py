@@ -112,8 +112,8 @@ class TransferCertifier:
                 self._timed.add(key)
                 legs = legs_of(query, self.retimer, Tried(), self._moves)
                 steps = self._steps_of(legs) if legs else self._one_by_one(query)
-                self._known[key] = replace(refusal, steps=max(steps, refusal.steps))
-                refusals += [self._known[key]] if steps > refusal.steps else []
+                self._known[key] = timed = replace(refusal, steps=max(steps, refusal.steps))
+                refusals += [timed] if steps > refusal.steps else []
         return refusals
 
     def _as_known(self, sequencer: Sequencer, sequenced: SequencedBlocks) -> SequencedBlocks:
