@@ -10,6 +10,7 @@ from cellplan.measures.near_paths import resting_pairs
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.report import Check, Report
 from cellplan.model.settings.program import groups_of
+from cellplan.model.task.task import Service
 
 ROUNDING: Final = 1e-6  # [s] of times between rows
 
@@ -71,6 +72,7 @@ def check_task_rules(cell: Cell, phases: Sequence[JudgedPhase]) -> Iterator[Plac
         yield _check("task_order", worst, (after, 0.0, "s"), words, passed=after >= -ROUNDING)
     if cell.program.rest_s is not None:
         yield from _rests(cell, arcs, cell.program.rest_s)
+    yield from _services(cell, arcs)
 
 
 def _rests(cell: Cell, arcs: Mapping[str, _Arc], least: float) -> Iterator[PlacedCheck]:
@@ -86,6 +88,23 @@ def _rests(cell: Cell, arcs: Mapping[str, _Arc], least: float) -> Iterator[Place
     for rest, first, later in rests.values():
         words = f"the part cools for {rest:.4g} s between them, at least {least:g} s is demanded"
         yield _check("rest", (first, later), (rest, least, "s"), words, passed=rest >= least - ROUNDING)
+
+
+def _services(cell: Cell, arcs: Mapping[str, _Arc]) -> Iterator[PlacedCheck]:
+    """For each robot whose tool is cleaned the most tasks between two services; of several cycles, over two of them."""
+    for robot in (it for it in cell.robots if it.service is not None):
+        done = sorted((arc for arc in arcs.values() if arc.robot == robot.name), key=lambda arc: arc.begin)
+        groups = list[list[_Arc]]([[]])
+        for arc in done * min(cell.program.cycles, 2):
+            task = cell.task(arc.task)
+            is_clean = any(isinstance(it, Service) for it in task.via_before)
+            groups = [*groups, [arc]] if is_clean else [*groups[:-1], [*groups[-1], arc]]
+            groups += [[]] if any(isinstance(it, Service) for it in task.via_after) else []
+        longest, most = max(groups, key=len), robot.service.most if robot.service else 0
+        if longest:
+            words = f"done by {robot.name} between two services, at most {most} are demanded"
+            measured = len(longest), most, ""
+            yield _check("service", longest[: most + 1], measured, words, passed=len(longest) <= most)
 
 
 def _arcs(phases: Sequence[JudgedPhase]) -> dict[str, _Arc]:

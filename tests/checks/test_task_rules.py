@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cellplan.checks.joints.via_points import with_via_points
 from cellplan.files.cell.load import load_cell
 from cellplan.model.report.report import Check
 from cellplan.model.settings.program import OrderEntry, ProgramEntry
@@ -115,3 +116,32 @@ def test_tips_at_once_keep_the_distance_of_their_paths_on_the_part() -> None:
     assert passing.value >= 300.0
     assert (passing.passed, failing.passed, failing.limit) == (True, False, 700.0)
     assert checks_of(solved({"tasks.frame.after": "ring"}, arcs_apart_mm=Mm(700)), "arc_distance") == []
+
+
+SERVICE = {"at": [10, 0, 20, 0, 45, 0], "takes_s": 1.23, "every": {"seams": 1}}
+
+
+@pytest.mark.slow
+def test_a_tool_is_cleaned_in_its_place_for_its_time_and_not_too_late() -> None:
+    """The transfer with a service lasts as long as both ways and the service, in whole steps."""
+    cell = load_cell(FIXED).with_values(
+        {**VALUES, "tasks.frame.after": "ring", "robots.right.service": SERVICE, "program": {"cycles": 2}}
+    )
+    late = solve(cell, is_reported=False)
+    clean = solve(cell.with_values({"tasks.frame.via": {"before": ["service"]}}), is_reported=False)
+
+    [(_, count)] = checks_of(late, "service")
+    assert (count.passed, count.value, count.limit) == (False, 2, 1)  # one in each cycle
+    [(phase, stay), (_, count)] = checks_of(clean, "service")
+    assert (phase, stay.passed, stay.limit) == ("transfer-2", True, 1.23)
+    assert stay.value == pytest.approx(1.25)
+    assert (count.passed, count.value) == (True, 1)
+    run = next(run for run in clean.runs if run.name == phase)
+    rows = np.flatnonzero(np.abs(run.report.q["right"] - np.radians(SERVICE["at"])).max(axis=1) < 1e-9)
+    assert np.ptp(run.report.times[rows]) == pytest.approx(1.25)
+    for q in run.report.q.values():
+        assert np.ptp(q[rows], axis=0).max() < 1e-9
+    short = replace(run.report, times=run.report.times * 0.5)
+    reports = [short if it is run else it.report for it in clean.runs]
+    checks = [it for it in with_via_points(clean.cell, reports)[2].checks[len(short.checks) :] if it.name == "service"]
+    assert [(it.passed, it.value) for it in checks] == [(False, pytest.approx(0.625))]

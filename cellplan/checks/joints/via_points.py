@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.report.report import Check, Report
+from cellplan.model.task.task import Service, ViaPoint, configuration_of
 
 PASSED: Final = 1e-9  # [rad] or [m] within which a configuration is passed: rounding of the tables
 
@@ -30,7 +30,7 @@ def _checks(cell: Cell, reports: Sequence[Report], place: int) -> Iterator[Check
         return
     last = reports[place - 1].tasks if place else ()
     following = next((report.tasks for report in reports[place + 1 :] if report.tasks), ())
-    via: dict[str, list[Array | None]] = {}
+    via: dict[str, list[ViaPoint]] = {}
     for name in (*last, *following):
         task = next(
             (task for task in cell.tasks if task.name == name), None
@@ -40,13 +40,15 @@ def _checks(cell: Cell, reports: Sequence[Report], place: int) -> Iterator[Check
     for name, points in via.items():
         if points:
             yield _check(cell.robot(name), reports[place], points)
+        for service in (it for it in points if isinstance(it, Service)):
+            yield _stay(name, reports[place], service)
 
 
-def _check(robot: Robot, report: Report, points: Sequence[Array | None]) -> Check:
+def _check(robot: Robot, report: Report, points: Sequence[ViaPoint]) -> Check:
     """How far a robot is from the via point that it misses most; each is looked for from where it passes the last."""
     worst, at_s, first, q = 0.0, 0.0, 0, report.q[robot.name]
     for point in points:
-        at = np.asarray(robot.home if point is None else point)
+        at = configuration_of(point, np.asarray(robot.home))
         apart = np.abs(q[first:] - at).max(axis=1)
         passing = np.flatnonzero(apart <= PASSED)
         row = first + int(passing[0] if len(passing) else np.argmin(apart))
@@ -64,4 +66,22 @@ def _check(robot: Robot, report: Report, points: Sequence[Array | None]) -> Chec
         unit="rad or m",
         at_s=at_s,
         message=f"{robot.name} {verdict}{'' if passed else f', at {at_s:.3f} s'}",
+    )
+
+
+def _stay(robot: str, report: Report, service: Service) -> Check:
+    """How long a robot stands where its tool is cleaned."""
+    stands = np.abs(report.q[robot] - service.posture).max(axis=1) <= PASSED
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(int)))
+    spans = [(report.times[last - 1] - report.times[first], first) for first, last in edges.reshape(-1, 2)]
+    longest, first = max(spans, key=lambda it: float(it[0]), default=(0.0, 0))
+    return Check(
+        name="service",
+        subject=robot,
+        passed=bool(longest >= service.takes - PASSED),
+        value=float(longest),
+        limit=service.takes,
+        unit="s",
+        at_s=float(report.times[first]),
+        message=f"{robot} stands for {longest:.4g} s where its tool is cleaned, {service.takes:g} s are demanded",
     )

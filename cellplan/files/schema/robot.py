@@ -24,6 +24,7 @@ from cellplan.model.settings.entry import (
     rule,
 )
 from cellplan.model.settings.robot import FARTHEST, BodyAccuracyEntry, JointPosition, PayloadEntry
+from cellplan.model.settings.task import LONGEST_S
 from cellplan.model.settings.units import (
     Deg,
     DegPerS,
@@ -61,6 +62,8 @@ POSTURE_WORDS: Final = "auto or a list of joint angles"
 POSITION_WORDS: Final = (
     "auto, the name of a configuration in the SRDF, or a mapping with one key per joint (a1_deg, rail_mm)"
 )
+SERVICE_WORDS: Final = "a list of joint angles or a mapping with one key per joint (a1_deg, rail_mm)"
+MOST_SEAMS: Final = 10_000  # between two services
 ARGUMENT_WORDS: Final = "a text, a number, true or false"
 
 Configuration = Annotated[
@@ -70,6 +73,10 @@ Configuration = Annotated[
 NamedConfiguration = Annotated[
     Annotated[Text, Tag(f"<{POSITION_WORDS}>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
     by_kind(POSITION_WORDS, mapping=dict),
+]
+ServicePosture = Annotated[
+    Annotated[tuple[Angle, ...], Tag("<list>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
+    by_kind(SERVICE_WORDS, list=tuple, mapping=dict),
 ]
 XacroArgument = Annotated[
     Annotated[str, Tag(f"<{ARGUMENT_WORDS}>")]
@@ -83,6 +90,22 @@ LockedPosition = Annotated[
     Annotated[Literal["zero"], Tag(f"<{LOCK_WORDS}>")] | Annotated[JointPosition, Tag("<number>")],
     by_kind(LOCK_WORDS, number=(int, float)),
 ]
+
+
+class IntervalEntry(Entry):
+    """After how much work a tool is cleaned."""
+
+    seams: Annotated[int, Field(ge=1, le=MOST_SEAMS)] = Field(
+        description="Number of tasks that the robot does between two services at most."
+    )
+
+
+class ServiceEntry(Entry):
+    """Cleaning of a torch, or whatever else a tool needs after some work."""
+
+    at: ServicePosture = Field(description="Configuration in which the robot stands meanwhile.")
+    takes_s: Annotated[float, Field(gt=0.0, le=LONGEST_S)] = Field(description="Time for which it stands there.")
+    every: IntervalEntry = Field(description="How often.")
 
 
 class LimitsEntry(Entry):
@@ -251,6 +274,11 @@ class RobotEntry(Entry):
         default=True,
         description="Whether it can work. One that cannot stands at its home, and its tasks are open to the others: "
         "`cellplan assign` gives them away.",
+    )
+    service: ServiceEntry | None = Field(
+        default=None,
+        description="How its tool is cleaned: on its way to a task with service among the via points before it, or "
+        "from one with it after. Only with program.",
     )
     path: JointPathEntry | None = Field(
         default=None,

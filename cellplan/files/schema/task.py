@@ -41,7 +41,7 @@ TOOL_AXIS_WORDS: Final = f"normal, {DIRECTION_WORDS}"
 LAW_WORDS: Final = "constant, trapezoid, quintic or {trapezoid: {ramp: 0.25}}"
 CORNER_WORDS: Final = "stop or {blend_mm: 2}"
 AFTER_WORDS: Final = "the name of a task or a list of names"
-VIA_WORDS: Final = "home, a list of joint angles or a mapping with one key per joint (a1_deg, rail_mm)"
+VIA_WORDS: Final = "home, service, a list of joint angles or a mapping with one key per joint (a1_deg, rail_mm)"
 MOST_VIA: Final = 20
 POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
 
@@ -108,7 +108,7 @@ PositionChoice = Annotated[
 
 
 ViaPoint = Annotated[
-    Annotated[Literal["home"], Tag(f"<{VIA_WORDS}>")]
+    Annotated[Literal["home", "service"], Tag(f"<{VIA_WORDS}>")]
     | Annotated[tuple[Angle, ...], Tag("<list>")]
     | Annotated[dict[str, JointPosition], Tag("<mapping>")],
     by_kind(VIA_WORDS, list=tuple, mapping=dict),
@@ -117,7 +117,10 @@ ViaPoints = Annotated[tuple[ViaPoint, ...], Field(max_length=MOST_VIA)]
 
 
 class ViaEntry(Entry):
-    """Configurations that the robot of a task passes in transfer moves, at rest in each of them, in their order."""
+    """Configurations that the robot of a task passes in transfer moves, at rest in each of them, in their order.
+
+    In that of its service it stands for as long as that takes.
+    """
 
     before: ViaPoints = Field(default=(), description="On its way to the task.")
     after: ViaPoints = Field(default=(), description="On its way from the task.")

@@ -105,6 +105,7 @@ def _block(assignment: Assignment, place: int, run: Run, begin: float) -> dict[s
         "station": station,
         "begin_s": number(begin),
         "end_s": number(begin + run.report.cycle_time),
+        "cleaned_before": sorted(assignment.sequenced.schedule.cleaned(instance)[place]),
         "tasks": {
             robot: {
                 "task": end.mode.task,
@@ -200,8 +201,10 @@ def assign_lines(record: Record) -> list[str]:
         lines.append("  done by one robot alone: " + ", ".join(f"{task} ({robot})" for task, robot in only.items()))
     for block in record["blocks"]:
         tasks = ", ".join(f"{robot} {it['task']}" for robot, it in block["tasks"].items())
-        moves = ", the part moves" if "part_moves" in block else ""
-        lines.append(f"  {block['phase']} {block['begin_s']:g} to {block['end_s']:g} s: {tasks}{moves}")
+        words = ", the part moves" if "part_moves" in block else ""
+        if block["cleaned_before"]:
+            words += f"; before it the tools of {', '.join(block['cleaned_before'])} are cleaned"
+        lines.append(f"  {block['phase']} {block['begin_s']:g} to {block['end_s']:g} s: {tasks}{words}")
     lines += [f"  nearly as good: {_alternative_words(other)}" for other in record["alternatives"]]
     lines += [f"  LEFT OUT {message}" for message in record["left_out"]]
     return [*lines, *(f"  FAILED {message}" for message in record["failed"])]

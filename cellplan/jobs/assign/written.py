@@ -20,11 +20,14 @@ def written_cell(draft: AssignmentDraft, instance: Instance, sequenced: Sequence
     """The program of a schedule, read from the draft's document with the chosen values."""
     values: dict[str, object] = {}
     before: tuple[str, ...] = ()
-    for block, (station, ends) in zip(sequenced.schedule.blocks, sequenced.stops, strict=True):
+    schedule = sequenced.schedule
+    stops = zip(schedule.blocks, sequenced.stops, schedule.cleaned(instance), strict=True)
+    for block, (station, ends), cleaned in stops:
         for end in ends:
             if end is not None:
                 values |= task_values(draft.cell, end, before, _holder(instance, station))
                 values |= {f"tasks.{end.mode.task}.holder_moves": True} if station in instance.columns else {}
+                values |= {f"tasks.{end.mode.task}.via": {"before": ["service"]}} if end.mode.robot in cleaned else {}
         before = block
     return draft.cell.with_values(values | order_values(sequenced, instance.step))
 

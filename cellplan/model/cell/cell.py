@@ -24,7 +24,7 @@ from cellplan.model.settings.controllers import ControllerEntry, RobotControlEnt
 from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.program import NoTransfers, ProgramEntry
 from cellplan.model.settings.solver import SolverEntry
-from cellplan.model.task.task import Frame, Task
+from cellplan.model.task.task import Frame, Service, Task
 
 
 class Mode(StrEnum):
@@ -80,6 +80,7 @@ class Robot:
         order: Names of its tasks and marks in the order of work; empty for the order of the cell's tasks.
         path: Its joints over the whole clock; None where they follow from the tasks.
         control: Where it is connected; None when no controller is stated.
+        service: How its tool is cleaned; None when it is not.
     """
 
     name: str
@@ -97,6 +98,7 @@ class Robot:
     order: tuple[str, ...] = ()
     path: JointSpline | None = None
     control: RobotControlEntry | None = None
+    service: Service | None = None
 
     @property
     def bodies_at_work(self) -> tuple[Body, ...]:

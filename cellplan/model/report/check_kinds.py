@@ -91,6 +91,7 @@ _LISTED: Final = (  # the gravest first
     CheckKind("controller_position", "positions that controllers show within their limits", "Shown position beyond its limit", group="joint limits", excess=DISTANCE, concern=LIMIT),
     CheckKind("joint_margin", "joints keep the demanded margin", "Joint too near its limit", excess=DISTANCE, concern=LIMIT),
     CheckKind("via_point", "via points passed", "Via point missed"),
+    CheckKind("service", "tools cleaned in time and long enough", "Tool cleaned too late or too shortly"),
     CheckKind("locked_joint", "failed joints at rest", "Failed joint moves"),
     CheckKind("home", "idle robots at their homes", "Idle robot leaves its home"),
     CheckKind("payload", "tool and part within the payload", "Payload exceeded"),

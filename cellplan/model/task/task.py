@@ -180,6 +180,29 @@ class StraightMove:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Service:
+    """Where and how long the tool of a robot is cleaned, and how often.
+
+    Attributes:
+        posture: Configuration of the robot meanwhile in [rad] or [m], shape (n,).
+        takes: Time in [s] for which it stands there.
+        most: Number of tasks after which the tool is cleaned at the latest, before the next one.
+    """
+
+    posture: Array
+    takes: float
+    most: int
+
+
+ViaPoint = Array | Service | None  # a configuration, a service, or None for home
+
+
+def configuration_of(point: ViaPoint, home: Array) -> Array:
+    """The configuration of a robot at a via point, shape (n,), as its home."""
+    return home if point is None else point.posture if isinstance(point, Service) else point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Task:
     """One operator's work on the part.
 
@@ -228,7 +251,7 @@ class Task:
         holder_posture: Configuration of the first holder at its start, likewise; None for that holder's start posture.
         holder_moves: Whether the first holder moves while it is done, in a program in which it rests otherwise.
         via_before: Configurations of its robot in [rad] or [m] that it passes in the transfer move to the task, shape
-            (n,) each; None for its home.
+            (n,) each; None for its home, or its service.
         via_after: Likewise in the transfer move from it.
         origin: File and lines that the task was read from; empty for a task made in Python.
     """
@@ -267,8 +290,8 @@ class Task:
     start_posture: Array | None = None
     holder_posture: Array | None = None
     holder_moves: bool = False
-    via_before: tuple[Array | None, ...] = ()
-    via_after: tuple[Array | None, ...] = ()
+    via_before: tuple[ViaPoint, ...] = ()
+    via_after: tuple[ViaPoint, ...] = ()
     origin: Origin = field(default_factory=Origin, compare=False, repr=False)
 
     def where(self, key: str = "", *, shared: str = "") -> str:

@@ -17,6 +17,7 @@ from cellplan.model.motion.motion import Motion, Schedule
 from cellplan.model.motion.plan import Hold, Phase
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task.clocked_path import ClockedPath
+from cellplan.model.task.task import Service, ViaPoint, configuration_of
 from cellplan.planning.modes import standing
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.sequence.near_starts import near_start
@@ -280,40 +281,45 @@ def dwell_times(stage: Stage) -> Array:
     return times
 
 
-def via_points(stages: Sequence[Stage], number: int, ends: tuple[Array, Array], home: Array) -> list[Array]:
-    """Stacked configurations that the transfer moves of a stage pass, both ends among them, shape (nq,) each.
+Pass = tuple[Array, float]  # a stacked configuration, shape (nq,), and the time in [s] for which all stand in it
+
+
+def via_points(stages: Sequence[Stage], number: int, ends: tuple[Array, Array], home: Array) -> list[Pass]:
+    """What the transfer moves of a stage pass, both ends among it.
 
     Robots first pass what is stated after their last tasks while the others stand. Then all go together, those that
-    have something to pass before their next tasks as far as that; they go on while the others stand.
+    have something to pass before their next tasks as far as that; they go on while the others stand. All stand while a
+    tool is cleaned.
     """
     before = stages[number - 1].cell.tasks if number else ()
     after = next((stage.cell.tasks for stage in stages[number + 1 :] if stage.cell.tasks), ())
     leaving, coming = ({task.robot: task.via_after for task in before}, {task.robot: task.via_before for task in after})
 
-    def moved(q: Array, via: Mapping[str, Sequence[Array | None]], place: int) -> Array:
-        q = q.copy()
+    def moved(q: Array, via: Mapping[str, Sequence[ViaPoint]], place: int) -> Pass:
+        q, stays = q.copy(), 0.0
         for robot, points in via.items():
             if place < len(points):
                 point, columns = points[place], stages[number].cell.columns(robot)
-                q[columns] = home[columns] if point is None else point
-        return q
+                stays = max(stays, point.takes if isinstance(point, Service) else 0.0)
+                q[columns] = configuration_of(point, home[columns])
+        return q, stays
 
-    passed = [ends[0]]
+    passed: list[Pass] = [(ends[0], 0.0)]
     for place in range(max(map(len, leaving.values()), default=0)):
-        passed.append(moved(passed[-1], leaving, place))
+        passed.append(moved(passed[-1][0], leaving, place))
     passed += [moved(ends[1], coming, place) for place in range(max(map(len, coming.values()), default=0))]
-    passed = [passed[0], *(q for other, q in pairwise(passed) if np.any(q != other))]
-    return [*passed, ends[1]] if len(passed) == 1 or np.any(passed[-1] != ends[1]) else passed
+    passed = [passed[0], *(it for other, it in pairwise(passed) if it[1] or np.any(it[0] != other[0]))]
+    return [*passed, (ends[1], 0.0)] if len(passed) == 1 or np.any(passed[-1][0] != ends[1]) else passed
 
 
-def _transferred(stage: Stage, scene: Scene, ends: Sequence[Array], home: Array, progress: Progress) -> PlannedStage:
+def _transferred(stage: Stage, scene: Scene, ends: Sequence[Pass], home: Array, progress: Progress) -> PlannedStage:
     """The transfer moves of one stage, from one stacked configuration to the next, at rest in each of them.
 
     Raises:
         InputError: Co-holders would have to move by themselves.
         BlockedTransferError: No way was found.
     """
-    cell, start, goal = scene.cell, ends[0], ends[-1]
+    cell, start, goal = scene.cell, ends[0][0], ends[-1][0]
     for name in cell.positioners if len(cell.positioners) > 1 else ():
         columns = cell.columns(name)
         if np.any(np.abs(goal[columns] - start[columns]) > CLOSED):
@@ -324,7 +330,7 @@ def _transferred(stage: Stage, scene: Scene, ends: Sequence[Array], home: Array,
             )
     alone, retimer = scene_of_run(scene, ()), transfer_retimer(scene)
     legs, rungs = list[Array](), dict[str, list[str]]()
-    for number, (a, b) in enumerate(pairwise(ends), start=1):
+    for number, ((a, _), (b, stays)) in enumerate(pairwise(ends), start=1):
         query = TransferQuery.of(alone, a, b, seed=cell.solver.seed, home=home)
         try:
             transfer = plan_transfer(query, retimer=retimer, progress=progress)
@@ -334,6 +340,7 @@ def _transferred(stage: Stage, scene: Scene, ends: Sequence[Array], home: Array,
             leg = f"leg {number} of {len(ends) - 1} over its via points"
             raise BlockedTransferError(error.place, f"{leg}: {error.what}", error.best) from error
         legs.append(transfer.q if not legs else transfer.q[1:])
+        legs.append(np.tile(b, (int(np.ceil(stays / cell.motion.step - CLOSED)), 1)))
         for robot, rung in transfer.rungs.items():
             rungs.setdefault(robot, []).append(rung.words)
     q = np.concatenate(legs)

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from cellplan.search.assign.cliques import cliques_at
 from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.rule_rows import add_rest_rows, add_rule_rows
+from cellplan.search.assign.rule_rows import add_rest_rows, add_rule_rows, add_service_rows
 from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order
 from cellplan.search.assign.solver import Solved, new_model
 from cellplan.search.assign.table import Key
@@ -83,8 +83,9 @@ class _BlockModel:
         self._in_order()
         add_rule_rows(self.model, instance, leads=self.leads, joins=self.joins, done=self._done)
         cost = sum(lead * (instance.steps(task) + least) for (task, _), lead in self.leads.items()) + self._tour(least)
+        cleaning, self._within = add_service_rows(self.model, instance, joins=self.joins, done=self._done)
         objective = self.model.new_int_var(0, HORIZON, "")
-        self.model.add(objective >= cost)
+        self.model.add(objective >= cost + cleaning)
         self.begins = add_rest_rows(
             self.model, instance, leads=self.leads, joins=self.joins, least=least, objective=objective
         )
@@ -98,7 +99,9 @@ class _BlockModel:
             blocks[leader].append(task)
         values = solved.answers[answer]
         begins = {task: values[it.index] for task, it in self.begins.items()}
-        sorted_blocks = sorted(map(tuple, blocks.values()), key=lambda block: begins.get(block[0], 0))
+        parts = dict(solved.true(self._within, answer))
+        times = {task: (begins.get(task, 0), parts.get(task, 0)) for task in chosen}
+        sorted_blocks = sorted(map(tuple, blocks.values()), key=lambda block: times[block[0]])
         ordered = in_order(sorted_blocks, self.instance.goals)
         return BlockSchedule(blocks=ordered or (), chosen=chosen)
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations, product
-from typing import Self
+from typing import Final, Self
 
 import numpy as np
 
@@ -35,6 +35,16 @@ class End:
     def end(self) -> Array:
         """Configuration in which it leaves the task, shape (n,)."""
         return self.mode.q[0 if self.is_reversed else -1]
+
+
+CLEANED: Final = "is cleaned"  # no task has such a name: names have no spaces
+READY: Final = "is ready"
+
+
+def standing(robot: str, q: Array, why: str) -> End:
+    """A configuration in which a robot stands before a task."""
+    mode = TaskMode(task=why, robot=robot, station=-1, spin=0.0, q=np.stack([q, q]), margin=0.0)
+    return End(mode=mode, is_reversed=False)
 
 
 @dataclass(eq=False, kw_only=True)

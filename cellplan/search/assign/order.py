@@ -4,7 +4,7 @@ For a given order the best modes of all robots are found by dynamic programming 
 takes as long as its slowest robot, or the part. Transfers that are not free straight cost what they were found to take.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations, pairwise, permutations, product
@@ -14,7 +14,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.search.assign.goals import TaskGoal
-from cellplan.search.assign.instance import End, Instance
+from cellplan.search.assign.instance import CLEANED, READY, End, Instance, standing
 from cellplan.search.assign.schedule import BlockSchedule, in_order
 from cellplan.search.assign.table import Key
 
@@ -60,6 +60,20 @@ class Layer:
             leaving.append(np.array([end.end for end in modes] or [instance.homes[robot]]))
             coming.append(np.array([end.begin for end in modes] or [instance.homes[robot]]))
         return cls(station=station, ends=ends, leaving=leaving, coming=coming, crowding=crowding(instance, ends))
+
+    def preceding(self, instance: Instance, cleaned: Collection[str]) -> Self:
+        """Where the operators stand before the block while tools are cleaned: for that, or ready for their tasks."""
+        both = zip(instance.robots, self.ends, strict=True)
+        ends = [
+            [standing_before(instance, robot, it, cleaned) for it in (choices[:1] if robot in cleaned else choices)]
+            for robot, choices in both
+        ]
+        at = [
+            np.array([instance.homes[robot] if end is None else end.begin for end in choices])
+            for robot, choices in zip(instance.robots, ends, strict=True)
+        ]
+        none = np.zeros(list(map(len, ends)), dtype=np.int64)
+        return type(self)(station=self.station, ends=ends, leaving=at, coming=at, crowding=none)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -108,11 +122,20 @@ class Sequencer:
     instance: Instance
     refusals: list[Refusal] = field(default_factory=list)
     _layers: dict[frozenset[Key], Layer] = field(default_factory=dict)
+    _before: dict[tuple[Layer, frozenset[str]], Layer] = field(default_factory=dict)
     _known: dict[tuple[Layer, Layer], tuple[int, Indices]] = field(default_factory=dict)  # and refusals in them
 
     def sequenced(self, schedule: BlockSchedule) -> SequencedBlocks:
         """The blocks in their order with the modes and directions that take least time."""
-        layers = [self._at_home, *(self._layer(schedule, block) for block in schedule.blocks), self._at_home]
+        layers = [self._at_home]
+        for block, cleaned in zip(schedule.blocks, schedule.cleaned(self.instance), strict=True):
+            layer = self._layer(schedule, block)
+            if cleaned:
+                if (layer, cleaned) not in self._before:
+                    self._before[layer, cleaned] = layer.preceding(self.instance, cleaned)
+                layers.append(self._before[layer, cleaned])
+            layers.append(layer)
+        layers.append(self._at_home)
         cost, back, costs = np.zeros([1] * len(self.instance.robots), dtype=np.int64), [], []
         for before, after in pairwise(layers):
             total = self._transfers(before, after) + np.expand_dims(cost, tuple(range(cost.ndim, 2 * cost.ndim)))
@@ -125,9 +148,10 @@ class Sequencer:
             moved.append(int(cost[place]))
             stops.append((after.station, tuple(it[k] for it, k in zip(after.ends, place, strict=True))))
             place = tuple(int(k) for k in np.unravel_index(came[place], before.shape))
-        waits = waits_of(self.instance, schedule, moved[:0:-1])
+        blocks = [(it, to) for it, to in zip(stops[:0:-1], moved[:0:-1], strict=True) if not is_preceding(it[1])]
+        waits = waits_of(self.instance, schedule, [to for _, to in blocks])
         steps = schedule.work(self.instance) + moved[0] + sum(waits)
-        return SequencedBlocks(schedule=schedule, stops=tuple(reversed(stops[1:])), steps=steps, waits=waits)
+        return SequencedBlocks(schedule=schedule, stops=tuple(it for it, _ in blocks), steps=steps, waits=waits)
 
     def ordered(self, schedule: BlockSchedule) -> SequencedBlocks:
         """The best order found: stations in a short tour, blocks of a station relocated while that saves time."""
@@ -167,9 +191,12 @@ class Sequencer:
     def _straight(self, before: Layer, after: Layer) -> Indices:
         """Likewise, of transfers that are free straight."""
         steps: Indices = np.zeros((*before.shape, *after.shape), dtype=np.int32)
-        steps += self.instance.station_steps(before.station, after.station)
+        firsts = [ends[0] for ends in before.ends]
+        steps += 0 if is_preceding(firsts) else self.instance.station_steps(before.station, after.station)
         for axis, robot in enumerate(self.instance.robots):
             table = self.instance.transfer_steps(robot, before.leaving[axis][:, None], after.coming[axis][None])
+            if (first := firsts[axis]) is not None and first.mode.task == READY:
+                table = np.where(table > 0, CROWDED, 0)  # it stays where it is
             shape = [1] * steps.ndim
             shape[axis], shape[axis + len(before.shape)] = table.shape
             np.maximum(steps, table.reshape(shape), out=steps, casting="same_kind")
@@ -188,8 +215,8 @@ class Sequencer:
         steps[at] = np.maximum(steps[at], refusal.steps)
 
     def relocations(self, schedule: BlockSchedule) -> Iterator[BlockSchedule]:
-        """Schedules with one block at another place: of its station, or anywhere that may hide a rest of the part."""
-        return relocations(schedule, self.instance.goals, anywhere=bool(self.instance.rules.lags))
+        """Schedules with one block at another place: of its station, or anywhere where that counts."""
+        return relocations(schedule, self.instance.goals, anywhere=self.instance.rules.order_counts)
 
     def tours(self, schedule: BlockSchedule) -> list[BlockSchedule]:
         """The blocks with their stations in the shortest tours; where tasks must follow others, as soon as they may."""
@@ -198,7 +225,7 @@ class Sequencer:
             orders = [self._nearest_first(stations)]
         else:
             orders = sorted(permutations(stations), key=lambda order: (self._length(order), order))
-        tours = [schedule] if self.instance.rules.lags else list[BlockSchedule]()
+        tours = [schedule] if self.instance.rules.order_counts else list[BlockSchedule]()
         for order in orders:
             blocks = sorted(schedule.blocks, key=lambda block: order.index(schedule.station_of(block)))
             if (ordered := in_order(blocks, self.instance.goals)) is not None and len(tours) < TOURS:
@@ -218,6 +245,28 @@ class Sequencer:
             order.append(min(left, key=lambda it: (self.instance.station_steps(last, it), it)))
             left.discard(order[-1])
         return tuple(order)
+
+
+def standing_before(instance: Instance, robot: str, end: End | None, cleaned: Collection[str]) -> End | None:
+    """Where a robot stands before a block while tools are cleaned: for that, or ready for its task; None at home."""
+    if robot in cleaned:
+        return standing(robot, instance.rules.services[robot].q, CLEANED)
+    return None if end is None else standing(robot, end.begin, READY)
+
+
+def all_stops(instance: Instance, sequenced: SequencedBlocks) -> Iterator[Stop]:
+    """The stops of a sequence, and before them where robots stand while tools are cleaned."""
+    cleaned = sequenced.schedule.cleaned(instance)
+    for (station, ends), robots in zip(sequenced.stops, cleaned, strict=True):
+        if robots:
+            both = zip(instance.robots, ends, strict=True)
+            yield station, tuple(standing_before(instance, robot, end, robots) for robot, end in both)
+        yield station, ends
+
+
+def is_preceding(ends: Sequence[End | None]) -> bool:
+    """Whether robots stand so before a block."""
+    return any(end is not None and end.mode.task in (CLEANED, READY) for end in ends)
 
 
 def crowding(instance: Instance, ends: Sequence[Sequence[End | None]]) -> Indices:
@@ -242,7 +291,9 @@ def waits_of(instance: Instance, schedule: BlockSchedule, moved: Sequence[int]) 
         moved: Steps of the transfers up to each block.
     """
     begins, waits, worked = dict[str, int](), list[int](), 0
-    for block, steps in zip(schedule.blocks, moved, strict=True):
+    services = instance.rules.services
+    for block, steps, cleaned in zip(schedule.blocks, moved, schedule.cleaned(instance), strict=True):
+        worked += max((services[robot].steps for robot in cleaned), default=0)
         begin = steps + worked + sum(waits)
         lags = (it for it in instance.rules.lags.items() if it[0][0] in begins and it[0][1] in block)
         waits.append(max([0, *(begins[first] + lag - begin for (first, _), lag in lags)]))

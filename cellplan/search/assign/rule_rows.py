@@ -36,6 +36,43 @@ def add_rule_rows(
                     model.add(both[0] == (both[1] if len(both) > 1 else 0))
 
 
+def add_service_rows(
+    model: Any, instance: Instance, *, joins: Literals, done: Callable[[str, int | str], Any]
+) -> tuple[Any, dict[tuple[str, int], Any]]:
+    """Services split the blocks into parts in which no robot does more tasks than between two of its services.
+
+    There are no more parts than tasks fill intervals: at each service some robot has done as many as it may.
+
+    Returns:
+        Steps that the services take at least, and whether a task is done in a part; none without services.
+    """
+    services, tasks = instance.rules.services, instance.tasks
+    last = (len(tasks) - 1) // min((it.most for it in services.values()), default=len(tasks))
+    if last <= 0:
+        return 0, {}
+    within = {(task, part): model.new_bool_var("") for task in tasks for part in range(last + 1)}
+    begun = [model.new_bool_var("") for _ in range(last)]
+    parts = {task: sum(part * within[task, part] for part in range(last + 1)) for task in tasks}
+    for task in tasks:
+        model.add_exactly_one(within[task, part] for part in range(last + 1))
+        for part, begins in enumerate(begun, start=1):
+            model.add_implication(within[task, part], begins)
+        for first in (it for it in instance.goals[task].after if it in parts):
+            model.add(parts[task] >= parts[first])
+    for earlier, later in pairwise(begun):
+        model.add_implication(later, earlier)
+    for (task, leader), join in joins.items():
+        model.add(parts[task] == parts[leader]).only_enforce_if(join)
+    for robot, service in services.items():
+        model.add(sum(done(task, robot) for task in tasks) <= service.most * (1 + sum(begun)))
+        for part in range(last + 1):
+            both = [(model.new_bool_var(""), done(task, robot), within[task, part]) for task in tasks]
+            for it, is_done, is_within in both:
+                model.add(it >= is_done + is_within - 1)
+            model.add(sum(it for it, _, _ in both) <= service.most)
+    return sum(begun) * min(it.steps for it in services.values()), within
+
+
 def add_rest_rows(
     model: Any, instance: Instance, *, leads: Literals, joins: Literals, least: int, objective: Any
 ) -> dict[str, Any]:

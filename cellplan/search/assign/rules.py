@@ -20,6 +20,16 @@ ARC_TIMES: Final = 400  # at which the distance of two arcs is taken
 ROUNDING: Final = 1e-9  # [steps] of a time
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ServiceRule:
+    """How the tool of a robot is cleaned."""
+
+    q: Array  # configuration meanwhile in [rad] or [m], shape (n,)
+    steps: int  # that it takes
+    most: int  # tasks between two services
+    is_due: bool = False  # whether it comes before the first task, as one cycle follows another
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskRules:
     """What holds between tasks beside what they come after."""
@@ -30,6 +40,7 @@ class TaskRules:
     # to that of the second at least, where it comes later; such tasks share a block only where they are together
     crowded: Mapping[tuple[str, str], frozenset[tuple[bool, bool]]] = field(default_factory=dict)  # of two tasks that
     # begin together: whether each is done backwards, where their arcs then come too near
+    services: Mapping[str, ServiceRule] = field(default_factory=dict)  # by robot
     where: str = "program"  # where they stand
 
     @classmethod
@@ -40,6 +51,7 @@ class TaskRules:
             together=groups_of(cell.program.together),
             lags=_lags(cell),
             crowded=_crowded(cell),
+            services=_services(cell),
             where=cell.origin.at("program"),
         )
 
@@ -51,6 +63,11 @@ class TaskRules:
     def is_crowded(self, tasks: tuple[str, str], are_reversed: tuple[bool, bool]) -> bool:
         """Whether the arcs of two tasks come too near where each is done backwards, or is not."""
         return are_reversed in self.crowded.get(tasks, ())
+
+    @property
+    def order_counts(self) -> bool:
+        """Whether the time beside transfers depends on the order of the blocks."""
+        return bool(self.lags or self.services)
 
     @property
     def grouped(self) -> int:
@@ -87,6 +104,20 @@ class TaskRules:
         return all(len({chosen[task][0] for task in group}) == 1 for group in self.same_robot) and all(
             len({block_of[task] for task in group}) == 1 for group in self.together
         )
+
+
+def _services(cell: Cell) -> dict[str, ServiceRule]:
+    """How the tools of robots are cleaned, by robot."""
+    return {
+        robot.name: ServiceRule(
+            q=robot.service.posture,
+            steps=steps_over(robot.service.takes, cell.motion.step),
+            most=robot.service.most,
+            is_due=cell.program.cycles > 1,
+        )
+        for robot in cell.robots
+        if robot.service is not None
+    }
 
 
 def _lags(cell: Cell) -> dict[tuple[str, str], int]:

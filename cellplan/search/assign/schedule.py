@@ -26,8 +26,21 @@ class BlockSchedule:
         return frozenset(map(frozenset, self.blocks)), frozenset(self.chosen.items())
 
     def work(self, instance: Instance) -> int:
-        """Whole steps of all blocks, without what lies between them."""
-        return sum(max(instance.steps(task) for task in block) for block in self.blocks)
+        """Whole steps of all blocks and of all services, without transfers and rests."""
+        services = instance.rules.services
+        cleaning = sum(max((services[it].steps for it in robots), default=0) for robots in self.cleaned(instance))
+        return cleaning + sum(max(instance.steps(task) for task in block) for block in self.blocks)
+
+    def cleaned(self, instance: Instance) -> list[frozenset[str]]:
+        """Robots whose tools are cleaned on the way to each block: where one must be, all that work in it."""
+        services, robots = instance.rules.services, list[frozenset[str]]()
+        since = {robot: it.most if it.is_due else 0 for robot, it in services.items()}
+        for block in self.blocks if services else ():
+            working = [robot for task in block if (robot := self.chosen[task][0]) in services]
+            is_due = any(since[robot] == services[robot].most for robot in working)
+            robots.append(frozenset(robot for robot in working if is_due and since[robot]))
+            since |= {robot: 1 + (0 if robot in robots[-1] else since[robot]) for robot in working}
+        return robots or [frozenset()] * len(self.blocks)
 
 
 def keeps_columns(instance: Instance, schedule: BlockSchedule) -> bool:

@@ -17,7 +17,7 @@ from cellplan.planning.transfer.straight_moves import StraightMoves
 from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop
+from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop, all_stops, is_preceding
 from cellplan.search.assign.schedule import BlockSchedule, refuse_impossible
 
 MOST_TRIED: Final = 400  # orders of blocks, and tasks exchanged between them
@@ -129,7 +129,7 @@ class TransferCertifier:
     ) -> Iterator[tuple[TransferQuery, tuple[int | None, int | None], bytes]]:
         """Transfers of a sequence with their stations, each with what it is known by."""
         resting: Stop = (None, (None,) * len(sequencer.instance.robots))
-        for before, after in pairwise((resting, *sequenced.stops, resting)):
+        for before, after in pairwise((resting, *all_stops(sequencer.instance, sequenced), resting)):
             start, goal = self._stacked(sequencer, before, leaves=True), self._stacked(sequencer, after, leaves=False)
             query = TransferQuery.of(self.scene, start, goal, seed=0, home=self.home)
             yield query, (before[0], after[0]), np.concatenate([start, goal]).tobytes()
@@ -168,7 +168,7 @@ class TransferCertifier:
         holder = sequencer.instance.stations.holder
         if station is not None and holder is not None:
             stations = sequencer.instance.stations
-            q[cell.columns(holder)] = (stations.left if leaves else stations.q)[station]
+            q[cell.columns(holder)] = (stations.left if leaves and not is_preceding(ends) else stations.q)[station]
         for robot, end in zip(sequencer.instance.robots, ends, strict=True):
             if end is not None:
                 q[cell.columns(robot)] = end.end if leaves else end.begin

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from itertools import pairwise, permutations, product
 
+import numpy as np
 import pytest
 from builders.assignments import small_instance
 
@@ -12,7 +13,7 @@ from cellplan.search.assign.cliques import cliques_at, excludes
 from cellplan.search.assign.greedy import greedy_schedule, improved
 from cellplan.search.assign.instance import Instance
 from cellplan.search.assign.order import Sequencer, waits_of
-from cellplan.search.assign.rules import TaskRules
+from cellplan.search.assign.rules import ServiceRule, TaskRules
 from cellplan.search.assign.schedule import BlockSchedule, in_order, refuse_impossible
 
 LEAST = 5  # [steps] of a transfer
@@ -46,14 +47,35 @@ def model_cycle(instance: Instance, schedule: BlockSchedule) -> int:
         places = [None, *order]
         steps = sum(max(instance.station_steps(a, b) - LEAST, 0) for a, b in pairwise(places))
         tours.append(steps + instance.station_steps(places[-1], None))
-    cost = schedule.work(instance) + LEAST * len(schedule.blocks) + min(tours)
+    work = sum(max(instance.steps(task) for task in block) for block in schedule.blocks)
+    cost = work + LEAST * len(schedule.blocks) + min(tours)
+    if instance.rules.services:
+        return cost + fewest_services(instance, schedule) * min(it.steps for it in instance.rules.services.values())
     if not instance.rules.lags:
         return cost
     orders = (BlockSchedule(blocks=it, chosen=schedule.chosen) for it in permutations(schedule.blocks))
     allowed = [it for it in orders if in_order(it.blocks, instance.goals) == it.blocks]
     moved = [LEAST * (place + 1) for place in range(len(schedule.blocks))]
     waits = min(sum(waits_of(instance, it, moved)) for it in allowed)
-    return max(cost, schedule.work(instance) + moved[-1] + waits)
+    return max(cost, work + moved[-1] + waits)
+
+
+def fewest_services(instance: Instance, schedule: BlockSchedule) -> int:
+    """Times at which all tools are cleaned, each as late as possible, in the order of blocks that needs fewest."""
+    counts = []
+    for order in permutations(schedule.blocks):
+        if in_order(order, instance.goals) != order:
+            continue
+        times, since = 0, dict.fromkeys(instance.robots, 0)
+        for block in order:
+            robots = {schedule.chosen[task][0] for task in block}
+            limits = {name: it.most for name, it in instance.rules.services.items() if name in robots}
+            if any(since[name] + 1 > most for name, most in limits.items()):
+                times, since = times + 1, dict.fromkeys(instance.robots, 0)
+            for name in robots:
+                since[name] += 1
+        counts.append(times)
+    return min(counts)
 
 
 def best_by_enumeration(instance: Instance) -> int | None:
@@ -132,6 +154,10 @@ def lags(*pairs: tuple[str, str], steps: int) -> dict[tuple[str, str], int]:
     return {(a, b): steps + 7 * (a > b) for pair in pairs for a, b in (pair, pair[::-1])}
 
 
+def cleaning(most: int, steps: int = 30) -> ServiceRule:
+    return ServiceRule(q=np.array([0.5, -0.5]), steps=steps, most=most)
+
+
 RULES = {
     "rest": TaskRules(lags=lags(("t0", "t1"), steps=110)),
     "rests of all": TaskRules(lags=lags(("t0", "t1"), ("t1", "t2"), ("t2", "t3"), ("t0", "t3"), steps=90)),
@@ -139,6 +165,7 @@ RULES = {
     "arcs": TaskRules(crowded={pair: frozenset({(False, False)}) for pair in permutations(("t0", "t2", "t3"), 2)}),
     "same robot": TaskRules(same_robot=(("t0", "t1", "t3"),)),
     "together": TaskRules(together=(("t1", "t3"),)),
+    "service": TaskRules(services={"a": cleaning(1), "b": cleaning(2)}),
     "both": TaskRules(same_robot=(("t0", "t3"),), together=(("t2", "t3"),)),
 }
 
@@ -210,7 +237,9 @@ def test_two_of_a_clique_are_never_at_work_together(seed: int) -> None:
             assert len(clique) > 1
 
 
-@pytest.mark.parametrize("rules", [TaskRules(), RULES["rests of all"]], ids=["free", "rests"])
+@pytest.mark.parametrize(
+    "rules", [TaskRules(), RULES["rests of all"], RULES["service"]], ids=["free", "rests", "service"]
+)
 @pytest.mark.parametrize("seed", range(3))
 def test_the_bound_is_below_every_sequence_of_blocks(seed: int, rules: TaskRules) -> None:
     pytest.importorskip("ortools")
@@ -222,3 +251,42 @@ def test_the_bound_is_below_every_sequence_of_blocks(seed: int, rules: TaskRules
     for schedule in (greedy_schedule(instance), improved(instance, greedy_schedule(instance)), answer.schedule):
         assert schedule is not None
         assert sequencer.ordered(schedule).steps >= answer.bound
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_services_come_before_a_task_too_many_and_take_their_time_and_two_transfers(seed: int) -> None:
+    """The sequence with the straight transfers over the place of service, worked out once more block by block."""
+    instance = small_instance(seed, 7, modes=2, rules=TaskRules(services={"a": cleaning(2), "b": cleaning(2, 40)}))
+    sequencer = Sequencer(instance)
+    sequenced = sequencer.sequenced(improved(instance, greedy_schedule(instance)))
+    schedule, steps = sequenced.schedule, 0
+    since, q, station = dict.fromkeys(instance.robots, 0), dict(instance.homes), None
+
+    def go(to: dict[str, np.ndarray]) -> int:
+        """Steps until all are there."""
+        taken = max(int(instance.transfer_steps(name, q[name], to[name])) for name in instance.robots)
+        q.update(to)
+        return taken
+
+    cleaned = 0
+    for block, (at, ends), robots in zip(schedule.blocks, sequenced.stops, schedule.cleaned(instance), strict=True):
+        begins = {
+            name: instance.homes[name] if end is None else end.begin
+            for name, end in zip(instance.robots, ends, strict=True)
+        }
+        over = {name: np.array([0.5, -0.5]) if name in robots else begins[name] for name in instance.robots}
+        steps += max(go(over), instance.station_steps(station, at))
+        if robots:
+            cleaned += 1
+            steps += max(instance.rules.services[name].steps for name in robots) + go(begins)
+        steps += max(instance.steps(task) for task in block)
+        for name, end in zip(instance.robots, ends, strict=True):
+            if end is not None:
+                since[name] = 1 + (0 if name in robots else since[name])
+                q[name] = end.end
+        assert max(since.values()) <= 2
+        station = at
+    steps += max(go(dict(instance.homes)), instance.station_steps(station, None))
+
+    assert cleaned
+    assert sequenced.steps == steps

@@ -16,6 +16,7 @@ from cellplan.files.schema import CellDocument
 from cellplan.files.schema.cell import CycleEntry, MotionEntry
 from cellplan.files.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
 from cellplan.files.schema.path import PathEntry, PolylineEntry
+from cellplan.files.schema.robot import RobotEntry, ServiceEntry
 from cellplan.files.schema.shapes import ObstacleEntry
 from cellplan.files.schema.task import BlendEntry, CornerChoice, TaskEntry, TrapezoidEntry, ViaEntry
 from cellplan.files.schema.tool import OF_ROD, RodEntry, ToolEntry
@@ -35,12 +36,14 @@ from cellplan.model.task.task import (
     PolygonPath,
     RunDirection,
     SampledPath,
+    Service,
     SpacePolylinePath,
     StraightMove,
     Task,
     TimedPath,
     TimeLaw,
     TimeLawKind,
+    ViaPoint,
 )
 
 COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
@@ -76,7 +79,15 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         gripper=gripper_bodies(entry, model),
         order=_order(name, document),
         control=entry.controller,
+        service=_service(entry.service, model),
     )
+
+
+def _service(entry: ServiceEntry | None, model: RobotModel) -> Service | None:
+    """How the tool of a robot is cleaned."""
+    if entry is None:
+        return None
+    return Service(posture=configuration_in_si(model, entry.at), takes=entry.takes_s, most=entry.every.seams)
 
 
 def _order(robot: str, document: CellDocument) -> tuple[str, ...]:
@@ -157,7 +168,7 @@ def build_task(
         start_posture=_posture(entry.given_start, models, entry.robot),
         holder_posture=_posture(entry.given_holder, models, *(it.robot for it in document.part.held_by[:1])),
         holder_moves=bool(entry.holder_moves),
-        **_via_points(entry.via or ViaEntry(), models, entry.robot),
+        **_via_points(entry.via or ViaEntry(), models[entry.robot], document.robots[entry.robot]),
         origin=origin,
     )
 
@@ -167,10 +178,11 @@ def _blend(corners: CornerChoice) -> float | None:
     return corners.blend_mm.si if isinstance(corners, BlendEntry) else None
 
 
-def _via_points(via: ViaEntry, models: Mapping[str, RobotModel], robot: str) -> dict[str, Any]:
-    """The configurations that a robot passes before and after a task in [rad] or [m], None for its home, by field."""
+def _via_points(via: ViaEntry, model: RobotModel, robot: RobotEntry) -> dict[str, tuple[ViaPoint, ...]]:
+    """What a robot passes before and after a task, by field."""
+    stated: dict[object, ViaPoint] = {"home": None, "service": _service(robot.service, model)}
     return {
-        name: tuple(None if isinstance(point, str) else configuration_in_si(models[robot], point) for point in points)
+        name: tuple(stated[it] if isinstance(it, str) else configuration_in_si(model, it) for it in points)
         for name, points in (("via_before", via.before), ("via_after", via.after))
     }
 

@@ -53,7 +53,12 @@ def program_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Fi
 def posture_findings(
     valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument
 ) -> Iterator[Finding]:
-    """Start postures and holder configurations of tasks have a value for each joint, within its limits."""
+    """Configurations of tasks and services have a value for each joint, within its limits."""
+    for name, entry in valid.robots.items():
+        if entry.service is not None and name in models:
+            path: KeyPath = ("robots", name, "service", "at")
+            findings = list(configuration_findings(path, entry.service.at, models[name], document))
+            yield from findings or _limits(path, entry.service.at, models[name], document)
     holders = [robot for _, robot in holders_as_written(document)]
     for name, task in valid.tasks.items():
         for key, robot, given in (
@@ -70,7 +75,10 @@ def posture_findings(
 
         for key, points in (("before", task.via.before), ("after", task.via.after)) if task.via is not None else ():
             for index, point in enumerate(points):
-                path = ("tasks", name, "via", key, index)
+                path = "tasks", name, "via", key, index
+                by = valid.robots.get(task.robot)
+                if point == "service" and by is not None and by.service is None:
+                    yield document.finding(path, f"expected a robot with a service, got '{task.robot}' without: add it")
                 if isinstance(point, str) or task.robot not in models:
                     continue
                 findings = list(configuration_findings(path, point, models[task.robot], document))
@@ -93,6 +101,8 @@ def _without_program(valid: ValidEntries, document: YamlDocument) -> Iterator[Fi
     for name, robot in valid.robots.items():
         if robot.order is not None:
             yield document.key_finding(("robots", name, "order"), f"unexpected key without program: {CURE}")
+        if robot.service is not None:
+            yield document.key_finding(("robots", name, "service"), f"unexpected key without program: {CURE}")
     for name, task in valid.tasks.items():
         for key in TASK_KEYS:
             if getattr(task, key) is not None:

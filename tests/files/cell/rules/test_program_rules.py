@@ -92,9 +92,21 @@ def changes(*, program: str = "{}", order: str = "", second: str = "", motion: s
             "E2_deg, F2_deg",
         ),
         (
+            {"second": "via: {after: [service]}"},
+            "c:22: tasks.second.via.after[0]: expected a robot with a service, got 'worker' without: add it",
+        ),
+        (
+            {"order": "[ring, second]\n    service: {at: [0, 0, 0, 0, 0, 999], takes_s: 8, every: {seams: 0}}"},
+            "c:12: robots.worker.service.every.seams: expected a positive number, got 0",
+        ),
+        (
+            {"order": "[ring, second]\n    service: {at: [0, 0, 0, 0, 0, 999], takes_s: 8, every: {seams: 2}}"},
+            "c:12: robots.worker.service.at: expected 'F3' within its limits -400 .. 400 deg, got 999",
+        ),
+        (
             {"second": "via: {before: [[0, 0], [400, 0, 0, 0, 0, 0], {rail_mm: 0}, park], after: home}"},
-            "c:22: tasks.second.via.before[3]: expected home, a list of joint angles or a mapping with one key per "
-            "joint (a1_deg, rail_mm), got 'park'\n"
+            "c:22: tasks.second.via.before[3]: expected home, service, a list of joint angles or a mapping with one "
+            "key per joint (a1_deg, rail_mm), got 'park'\n"
             "c:22: tasks.second.via.after: expected a list of entries, got 'home'",
         ),
         (
