@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cellplan.errors import InputError
+from cellplan.errors import HomeNotFoundError, InputError
 from cellplan.jobs.assign.draft import AssignmentDraft
 
 OPEN = Path(__file__).resolve().parents[3] / "examples" / "open_tasks" / "open_frame.yaml"
@@ -48,6 +48,11 @@ def test_cells_of_which_no_assignment_is_made(tmp_path: Path, old: str, new: str
         draft(tmp_path, (old, new))
 
     assert words in str(refused.value)
+
+
+def test_homes_at_which_robots_touch_are_refused_before_anything_is_searched(tmp_path: Path) -> None:
+    with pytest.raises(HomeNotFoundError, match=r"robots\.west\.home_deg: the homes come too close: .* touches"):
+        draft(tmp_path, (HOME, HOME.replace("0, -40, 60, 0, 60, 0", "0, -60, 90, 0, 60, 0")))
 
 
 def test_the_grid_has_all_configurations_from_first_to_last(tmp_path: Path) -> None:
