@@ -7,12 +7,14 @@ import numpy as np
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.drawing import drawing
+from cellplan.jobs.fastest.timed_program import TimedProgram
 from cellplan.jobs.layout.finish.cycles import draft, is_scaled, shortest
-from cellplan.jobs.layout.finish.finish import clearance_of, margin_of, rejection_of, too_singular
+from cellplan.jobs.layout.finish.finish import CandidateResult, clearance_of, margin_of, rejection_of, too_singular
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.trials.limits import LimitRecord, Standing, standing_of
 from cellplan.jobs.layout.trials.prepared import PreparedSearch, prepared, values_of
 from cellplan.jobs.layout.trials.trial import EFFORT
+from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import silent
 from cellplan.report.record.common import Number, number
 from cellplan.scene.kinematics.reach import arm_reach
@@ -50,11 +52,11 @@ class Given(NamedTuple):
     reach: dict[str, float]  # reach of each arm, without its tool, in [m]
 
 
-def given_layout(request: LayoutRequest) -> Given:
-    """What is shown of the given layout of a search, whatever comes of the search."""
+def given_layout(request: LayoutRequest, program: TimedProgram | None = None) -> Given:
+    """What is shown of the given layout of a search, whatever comes of the search; its program where it is solved."""
     ready = prepared(request)
     return Given(
-        record=given_record(ready),
+        record=given_record(ready, program),
         drawing=drawing(ready.scene, _shown_start(ready), ready.schedule),
         reach={robot.name: float(arm_reach(robot.model, rounds=REACH)) for robot in ready.cell.robots},
     )
@@ -62,8 +64,7 @@ def given_layout(request: LayoutRequest) -> Given:
 
 def standing_of_given(ready: PreparedSearch) -> Standing | None:
     """How the given layout stands; None where a tool cannot follow."""
-    if ready.unled is not None and not ready.path_search.is_given:
-        return standing_of_given(ready.unled)
+    ready = _searched(ready)
     try:
         point = ready.coarse.evaluate(ready.coarse.given, ready.given_start)
     except NoSolutionError:
@@ -71,18 +72,47 @@ def standing_of_given(ready: PreparedSearch) -> Standing | None:
     return None if point is None else standing_of(ready.coarse, point, ready.demands(), EFFORT)
 
 
-def given_record(ready: PreparedSearch) -> GivenRecord:
+def given_program(ready: PreparedSearch) -> TimedProgram:
+    """The program of the given layout, certified.
+
+    Raises:
+        InputError, NoSolutionError: It has none.
+    """
+    searched = _searched(ready)
+    return draft(searched, _given_cell(searched), searched.duration, silent).certified(silent)
+
+
+def given_result(ready: PreparedSearch, trial: int, program: TimedProgram | None = None) -> CandidateResult | None:
+    """The given layout as what came of a trial; None where a tool loses its path at the nodes of the search.
+
+    Raises:
+        InputError, NoSolutionError: It has no program.
+    """
+    standing = standing_of_given(ready)
+    if standing is None:
+        return None
+    solved = given_program(ready) if program is None else program
+    if is_scaled(ready):
+        solved = shortest(ready, _given_cell(ready), solved, silent).certified(silent)
+    return CandidateResult(
+        trial=trial,
+        x=ready.coarse.given,
+        start=ready.given_start,
+        program=solved,
+        reason=rejection_of(solved, ready.variables),
+        standing=standing,
+        solves=1,
+    )
+
+
+def given_record(ready: PreparedSearch, program: TimedProgram | None = None) -> GivenRecord:
     """The given layout as ``solve`` has it; where it is rejected, what it breaks at the nodes of the search too."""
-    searched = ready.unled if ready.unled is not None and not ready.path_search.is_given else ready
+    searched = _searched(ready)
     standing, cycle = standing_of_given(searched), None
     try:
-        cell = searched.variables.given_cell.with_values(
-            values_of(searched, searched.coarse.given, searched.given_start)
-        )
-        solved = draft(searched, cell, searched.duration, silent)
-        program = solved.certified(silent)
+        program = given_program(ready) if program is None else program
         if is_scaled(searched):
-            cycle = shortest(searched, cell, solved, silent).cycle
+            cycle = shortest(searched, _given_cell(searched), program, silent).cycle
         elif searched.request.objective is Objective.CYCLE:
             cycle = program.cycle
     except (InputError, NoSolutionError) as error:
@@ -99,6 +129,16 @@ def given_record(ready: PreparedSearch) -> GivenRecord:
         "clearance_mm": _rounded(clearance_of(program)),
         "violations": _violations(searched, standing, rejected) if rejected else [],
     }
+
+
+def _searched(ready: PreparedSearch) -> PreparedSearch:
+    """The search in which the given layout is a point: without the joint path where the cell gives none."""
+    return ready.unled if ready.unled is not None and not ready.path_search.is_given else ready
+
+
+def _given_cell(ready: PreparedSearch) -> Cell:
+    """The given layout as a point of the search."""
+    return ready.variables.given_cell.with_values(values_of(ready, ready.coarse.given, ready.given_start))
 
 
 def _violations(ready: PreparedSearch, standing: Standing | None, rejected: str) -> list[LimitRecord]:

@@ -36,6 +36,7 @@ from cellplan.study.trial import StudyTrial
 
 SCHEMA: Final = "cellplan.layout/1"
 TOP: Final = 10  # [-] layouts that are listed
+SAME_CYCLE: Final = 1e-6  # [s] of rounding in a record
 SAME: Final = 1e-4  # [-] share by which figures of two layouts differ that are not one
 SLOWED: Final = 1.02  # [-] times the cycle that the joints allow, from which on it is said what else counts
 SWEPT: Final = 33  # [-] configurations that the swept area is made of
@@ -203,12 +204,17 @@ def _slowed(best: CandidateResult | None) -> Iterator[str]:
 
 
 def no_gain(cycle: float | None, given: GivenRecord) -> Iterator[str]:
-    """That the given layout passes in a shorter cycle than the best one of the search, in [s]; nothing otherwise."""
+    """That nothing is better than the given layout, where the best cycle in [s] is not shorter than that of its own."""
     shortest = given["cycle_s"]
-    if cycle is not None and shortest is not None and given["status"] == "conforming" and shortest < cycle:
+    if (
+        cycle is not None
+        and shortest is not None
+        and given["status"] == "conforming"
+        and shortest <= cycle + SAME_CYCLE
+    ):
         yield (
-            f"no gain: the given layout takes {shortest:.6g} s, less than the {cycle:.6g} s of this one; keep it, or "
-            "search on with more trials"
+            f"no gain: nothing better than the given layout was found, which takes {shortest:.6g} s; search on with "
+            "more trials"
         )
 
 

@@ -9,14 +9,16 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.jobs.fastest.timed_program import TimedProgram
 from cellplan.jobs.layout.finish.finish import CandidateResult, Finish, certified_cell
-from cellplan.jobs.layout.given_layout import Given, given_layout
+from cellplan.jobs.layout.given_layout import Given, given_layout, given_program, given_result
 from cellplan.jobs.layout.record import LayoutRecord, layout_record
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.result import head_of, layout_files, verdict_line
 from cellplan.jobs.layout.result_file import file_records, result_files
 from cellplan.jobs.layout.trials.prepared import PreparedSearch, prepared
-from cellplan.jobs.layout.trials.proposals import BESTS, SIZE, Proposals, is_candidate, proposals_of
+from cellplan.jobs.layout.trials.proposals import BESTS, SIZE, Proposal, Proposals, is_candidate, proposals_of
 from cellplan.jobs.layout.trials.searched import read_attempts, searched_cell
 from cellplan.jobs.layout.trials.trial import evaluate
 from cellplan.model.cell.cell import Cell
@@ -24,6 +26,7 @@ from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
 from cellplan.runs.write_run import versions
 from cellplan.search.programs.objective import Objective
+from cellplan.search.programs.program_problem import ProgramProblem
 from cellplan.study.folder import write_results
 from cellplan.study.study import Finished, Stop, Study
 from cellplan.study.trial import StudyTrial
@@ -66,6 +69,7 @@ class _Search:
     progress: Progress
     finish: Finish
     proposals: Proposals
+    program: TimedProgram | None = None  # that of the given layout where it is certified before the search
     given: Callable[[], Given] | None = None
     tried: dict[int, CandidateResult] = field(default_factory=dict)
 
@@ -108,7 +112,10 @@ class _Search:
                 passed.append(self.tried[number])
                 if self.ready.phases is None or self.request.objective is not Objective.CYCLE:
                     break
-        return min(passed, key=lambda result: (result.cycle, result.trial), default=None)
+        best = min(passed, key=lambda result: (result.cycle, result.trial), default=None)
+        if best is not None and self.ready.phases is not None and self.request.objective is Objective.CYCLE:
+            self.tried[best.trial] = best = self.finish.learned(best)
+        return best
 
     def candidates(self, finished: Finished) -> list[StudyTrial]:
         """Trials that conform by the search, best first."""
@@ -152,6 +159,8 @@ def search_layout(
             refuse_search(request, folder, resume=resume)
             pool = opened.enter_context(layout_workers(workers, request))
         ready = prepared(request)
+        program = _given_program(ready, progress)
+        proposals = proposals_of(request, ready)
         search = _Search(
             request=request,
             folder=folder,
@@ -160,7 +169,9 @@ def search_layout(
             stop=stop or Stop(seconds=BUDGET),
             progress=progress,
             finish=finish_of(ready, progress, workers=pool),
-            proposals=proposals_of(request, ready),
+            proposals=replace(proposals, detours=_given_detours(ready, program)),
+            program=program,
+            given=None if program is None else partial(given_layout, request, program),
         )
         finished, best = search.run(resume=resume)
         progress("writing the result", 1.0)
@@ -201,6 +212,7 @@ def finish_of(ready: PreparedSearch, progress: Progress, *, workers: int | Execu
 def _written(search: _Search, finished: Finished, best: CandidateResult | None) -> LayoutResult:
     """The record and all files."""
     given = given_layout(search.request) if search.given is None else search.given()
+    best = _not_worse(search, finished, given, best)
     record = layout_record(search.ready, finished, given, tried=search.tried, best=best)
     if best is not None:
         record["misplacement"] = best.misplacement
@@ -211,6 +223,44 @@ def _written(search: _Search, finished: Finished, best: CandidateResult | None) 
         record["files"] = file_records(files)  # type: ignore[typeddict-item]
     write_results(search.folder, {**layout_files(record), **files})
     return LayoutResult(record=record, best=best)
+
+
+def _given_program(ready: PreparedSearch, progress: Progress) -> TimedProgram | None:
+    """The given program whose transfers are to become shorter, certified; None without one."""
+    if ready.phases is None or ready.request.objective is not Objective.CYCLE:
+        return None
+    progress("solving the given layout", 0.0)
+    try:
+        return given_program(ready)
+    except (InputError, NoSolutionError):
+        return None
+
+
+def _given_detours(ready: PreparedSearch, program: TimedProgram | None) -> tuple[float, ...] | None:
+    """The detours of the transfers of the given program; None without one."""
+    problem = ready.coarse
+    if program is None or ready.phases is None or not isinstance(problem, ProgramProblem):
+        return None
+    point = problem.evaluate(problem.given, ready.given_start)
+    return None if point is None else ready.phases.with_detours(problem, point, program.solution).detours
+
+
+def _not_worse(
+    search: _Search, finished: Finished, given: Given, best: CandidateResult | None
+) -> CandidateResult | None:
+    """The best layout, or the given one where that passes in a cycle that is not longer; it is the first trial then."""
+    ready, cycle = search.ready, given.record["cycle_s"]
+    is_comparable = ready.unled is None and ready.variables.settings.misplacement is None
+    firsts = [trial for trial in finished.trials[:1] if trial.figures and Proposal.of_trial(trial).kind == "given"]
+    if cycle is None or given.record["status"] != "conforming" or not is_comparable or not firsts:
+        return best
+    if best is not None and best.cycle < cycle:
+        return best
+    result = given_result(ready, firsts[0].number, search.program)
+    if result is None or not result.passed:
+        return best
+    search.tried[result.trial] = result
+    return result
 
 
 def _is_enough(rejected: frozenset[int], trial: StudyTrial) -> bool:

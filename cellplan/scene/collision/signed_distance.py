@@ -13,6 +13,7 @@ from cellplan.scene.collision.bodies import BodyPoses, CollisionBody
 from cellplan.scene.collision.separation import separation
 
 TOLERANCE: Final = 1e-9  # [m] of the iteration: far below what any clearance is stated to
+OVERLAP_TOLERANCE: Final = 1e-6  # [m] likewise of overlaps: below, coal finds none of many round bodies
 MOST_STEPS: Final = 500  # of one iteration
 CACHE_SIZE: Final = 8  # [-] objects kept for each body
 FARTHEST: Final = 1e3  # [m] a deeper overlap is none: where its search fails coal returns the largest number there is
@@ -42,7 +43,7 @@ class SignedDistances:
             self._shapes.clear()
             self._pairs.clear()
         request, result = coal.DistanceRequest(), coal.DistanceResult()
-        request.gjk_tolerance = request.epa_tolerance = TOLERANCE
+        request.gjk_tolerance, request.epa_tolerance = TOLERANCE, OVERLAP_TOLERANCE
         request.gjk_max_iterations = MOST_STEPS
         count = poses.p.shape[1]
         kinds, kind = np.unique(ends[:, 0] * len(bodies) + ends[:, 1], return_inverse=True)

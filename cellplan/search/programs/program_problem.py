@@ -13,7 +13,7 @@ from cellplan.model.robot.robot import JointLimits
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
-from cellplan.search.programs.transfers import Transfers
+from cellplan.search.programs.transfers import HOME, Transfers
 
 FAR_FROM_SINGULAR: Final = 1e6  # [m] and [rad] in place of singular values of arms that are not at work
 
@@ -24,6 +24,7 @@ class ProgramProblem:
 
     phases: tuple[LayoutProblem, ...]  # the problems of its phases, P of them
     transfers: Transfers  # what leads from each to the next
+    homes: Indices  # phases at whose start the joints stand that are idle, or ``HOME`` where they do not, (P, nq)
     names: tuple[str, ...] = field(init=False)
     lower: Array = field(init=False)
     upper: Array = field(init=False)
@@ -51,12 +52,24 @@ class ProgramProblem:
             if point is None:
                 return None
             points.append(point)
-        return Point(x=x, **_stacked(points, "start", "q", "qd", "qdd"))
+        motion = _stacked(points, "q", "qd", "qdd")
+        q = self._at_homes(motion["q"])
+        return Point(x=x, start=q[[part.start for part in self.transfers.parts]].ravel(), **{**motion, "q": q})
 
     def derivatives(self, point: Point) -> PointDerivatives:
         """See ``Problem``."""
         parts = [phase.derivatives(self._of_phase(point, place)) for place, phase in enumerate(self.phases)]
-        return PointDerivatives(**_stacked(parts, "q", "qd", "qdd", "rates"))
+        derivatives = _stacked(parts, "q", "qd", "qdd", "rates")
+        return PointDerivatives(**{**derivatives, "q": self._at_homes(derivatives["q"])})
+
+    def _at_homes(self, q: Array) -> Array:
+        """Joints at the nodes, or their derivatives, (N, nq, ...), with idle robots where their work begins."""
+        moved = q.copy()
+        for rows, phases in zip(self.transfers.parts, self.homes, strict=True):
+            columns = np.flatnonzero(phases != HOME)
+            firsts = [self.transfers.parts[phase].start for phase in phases[columns].tolist()]
+            moved[rows, columns] = q[firsts, columns]
+        return moved
 
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
         """See ``Problem``; a tool and the part that it works on may touch: of them the task sets the distance."""

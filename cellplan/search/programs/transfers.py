@@ -5,12 +5,14 @@ All joints of a transfer share one law, whose bounds of speed, acceleration and 
 the time has derivatives where two joints are as slow as each other; it is a little longer than the true one.
 
 A transfer that is not free straight has to go round what is in its way. With :math:`\delta` the p-norm of what bodies
-miss of their demanded distances at some configurations along it, it is taken to last :math:`1 + \delta / (\delta + D)`
-times as long: more by a half where it is a decimetre deep, at most twice.
+miss of their demanded distances at some configurations along it, and a little more, it is taken to last
+:math:`1 + \kappa \delta / (\delta + D)` times as long. The detour :math:`\kappa` of each transfer is 1 until a planned
+program shows what it is.
 """
 
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Self
 
 import numpy as np
 
@@ -24,7 +26,9 @@ SHORTEST: Final = 1e-9  # [rad] or [m] of a move: what is shorter stands still
 STEP: Final = 1e-6  # [rad] or [m] to either side, by which the time is differentiated
 SAMPLES: Final = 15  # [-] configurations along a transfer at which distances are asked
 DEPTH_NORM: Final = 4.0  # [-] p of depths: nearly the deepest
-DEEP: Final = 0.1  # [m] D: depth with which a transfer lasts longer by a half
+DEEP: Final = 0.05  # [m] D: depth with which a transfer takes half of its detour
+RESERVE: Final = 0.005  # [m] beyond the demanded distances: bodies come nearer between the configurations
+DETOURS: Final = (0.2, 5.0)  # [-] smallest and largest detour that is learned
 HOME: Final = -1  # in place of a node
 
 
@@ -38,6 +42,7 @@ class Transfers:
     bounds: JointLimitsInTime  # limits of the joints
     step: float  # time between two rows in [s]
     bodies: tuple[CellDistances, ...]  # the bodies during each of them
+    detours: Array  # by how many times longer each of them takes where bodies are deep in each other, shape (T,)
 
     @classmethod
     def none(cls, joints: int, *, nodes: int) -> "Transfers":
@@ -45,13 +50,24 @@ class Transfers:
         nothing = np.zeros(joints)
         bounds = JointLimitsInTime(velocity=nothing, acceleration=nothing, jerk=nothing)
         ends, parts = np.zeros((2, 0, joints), dtype=np.intp), (slice(0, nodes),)
-        return cls(parts=parts, ends=ends, home=nothing, bounds=bounds, step=1.0, bodies=())
+        return cls(parts=parts, ends=ends, home=nothing, bounds=bounds, step=1.0, bodies=(), detours=np.zeros(0))
 
     def seconds(self, x: Array, q: Array) -> float:
         """Time of them all in [s], for variables of shape (n,) and joint positions at the nodes, shape (N, nq)."""
+        times, shares = self._straight(x, q)
+        return float(times @ (1.0 + self.detours * shares))
+
+    def learned(self, x: Array, q: Array, seconds: Sequence[float]) -> Self:
+        """The same with the detours of a planned program, whose transfers take so many seconds, shape (T,)."""
+        times, shares = self._straight(x, q)
+        shown = (np.array(seconds) / np.maximum(times, self.step) - 1.0) / np.maximum(shares, SHORTEST)
+        return replace(self, detours=np.where(times * shares > 0.0, np.clip(shown, *DETOURS), self.detours))
+
+    def _straight(self, x: Array, q: Array) -> tuple[Array, Array]:
+        """Times of straight moves in [s] and shares of their detours, shape (T,) each."""
         begin, end = self._ends(q, self.home)
         depths = np.array([depth_along(bodies, x, *at)[0] for bodies, *at in zip(self.bodies, begin, end, strict=True)])
-        return float(self._times(end - begin) @ (1.0 + depths / (depths + DEEP)))
+        return self._times(end - begin), depths / (depths + DEEP)
 
     def derivatives(self, x: Array, q: Array, dq: Array) -> Array:
         """Derivatives of this time by the variables, shape (n,), from those of the joints, shape (N, nq, n)."""
@@ -62,8 +78,8 @@ class Transfers:
             move, by = end[place] - begin[place], changes[1][place] - changes[0][place]
             slopes = (self._times(move + sides) - self._times(move - sides)) / (2.0 * STEP)
             depth, by_depth = depth_along(bodies, x, begin[place], end[place], changes[:, place])
-            total += (1.0 + depth / (depth + DEEP)) * slopes @ by
-            total += times[place] * DEEP / (depth + DEEP) ** 2 * by_depth
+            total += (1.0 + self.detours[place] * depth / (depth + DEEP)) * slopes @ by
+            total += times[place] * self.detours[place] * DEEP / (depth + DEEP) ** 2 * by_depth
         return total
 
     def _ends(self, of_nodes: Array, at_home: Array) -> Array:
@@ -96,8 +112,9 @@ def depth_along(
         changes: Derivatives of both by the variables, shape (2, nq, n); None where those of the depth are not needed.
     """
     share = np.linspace(0.0, 1.0, SAMPLES + 2)[1:-1, None]
-    near = bodies.near(x, begin + share * (end - begin), bodies.most_demanded)
-    missed = np.maximum(bodies.demands[near.rows] - near.distances, 0.0)
+    near = bodies.near(x, begin + share * (end - begin), bodies.most_demanded + RESERVE)
+    demands = bodies.demands[near.rows]
+    missed = np.maximum(demands + np.where(demands > 0.0, RESERVE, 0.0) - near.distances, 0.0)
     depth = float(np.linalg.norm(missed, ord=DEPTH_NORM)) if len(missed) else 0.0
     if changes is None or depth <= 0.0:
         return depth, np.zeros(len(x))

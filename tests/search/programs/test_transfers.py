@@ -29,7 +29,13 @@ def _seconds(begin: np.ndarray, end: np.ndarray) -> float:
     ends = np.array([[np.zeros(JOINTS)], [np.ones(JOINTS)]], dtype=int)
     bodies: tuple = (_Nothing(),)
     transfers = Transfers(
-        parts=(slice(0, 1), slice(1, 2)), ends=ends, home=np.zeros(JOINTS), bounds=BOUNDS, step=STEP, bodies=bodies
+        parts=(slice(0, 1), slice(1, 2)),
+        ends=ends,
+        home=np.zeros(JOINTS),
+        bounds=BOUNDS,
+        step=STEP,
+        bodies=bodies,
+        detours=np.ones(1),
     )
     return transfers.seconds(np.zeros(2), np.array([begin, end]))
 

@@ -63,7 +63,8 @@ def read_layout(
 ) -> tuple[LayoutSettings, list[Finding]]:
     """What a layout search may change, and what is wrong with it.
 
-    A file that says nothing lets the bases of all operators and the start of the first holder change.
+    A file that says nothing lets the bases of all operators and the start of the first holder change; its base too
+    where it grips the part, or puts it down, at a place in the world.
     """
     entry = valid.layout or LayoutEntry()
     context, reading = Context(valid=valid, models=models, document=document), _Reading()
@@ -122,15 +123,17 @@ def _keep(into: list[Any], entry: Any, reading: _Reading) -> None:
 
 
 def _usual(context: Context) -> dict[str, Any]:
-    """Ranges of a file that gives none: bases of the operators near their places, and the start of the first holder."""
+    """Ranges of a file that gives none: bases near their places, and the start of the first holder."""
     valid, usual = context.valid, dict[str, Any]()
     holders = [grasp.robot for grasp in valid.part.held_by] if valid.part is not None else []
-    operators = {task.robot for task in valid.tasks.values()} - set(holders)
+    movable = {task.robot for task in valid.tasks.values()} - set(holders)
+    if valid.program is not None and (valid.program.attach or valid.program.detach):
+        movable |= set(holders[:1])
     planes = [it.plane.z_mm for it in valid.environment.values() if it.plane is not None]
     middle = _middle(valid, holders)
     for name, entry in valid.robots.items():
         mount = entry.mount
-        if name not in operators or (mount is not None and mount.wall is not None):
+        if name not in movable or (mount is not None and mount.wall is not None):
             continue
         z = entry.base.xyz_mm[2]
         ranges = {f"{side}_mm": _near(entry.base.xyz_mm[i], middle[i]) for i, side in enumerate(SIDES)}

@@ -31,6 +31,7 @@ from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Effort, Objective
+from cellplan.search.programs.program_problem import ProgramProblem
 from cellplan.search.variables.variables import Variables
 from cellplan.study.trial import StudyTrial
 from cellplan.study.workers import Workers
@@ -43,6 +44,8 @@ FINISH: Final = Effort(iterations=25, keys=25, trust=0.2)  # of a layout that is
 FINER: Final = (2, 4)  # [-] times as many nodes of a program whose tools lose their paths
 REFINED: Final = 3  # [-] times that nodes are added for a shorter cycle before it is certified
 GAIN: Final = 0.001  # [-] share of the cycle that each of them must gain
+LEARNED: Final = 4  # [-] times that a program is improved with the detours of its transfers
+SHORTER: Final = 0.005  # [-] share of its cycle that each of them must gain
 ROUNDS: Final = 4  # [-] times that a layout is improved and solved before it is given up
 MORE_ANGLE: Final = np.radians(0.05)  # [rad] asked for beyond what was missed
 MORE_LENGTH: Final = 0.0005  # [m] likewise
@@ -153,16 +156,35 @@ class Finish:
 
     def certified(self, finalist: Finalist) -> CandidateResult:
         """A layout of the search, certified or with the reason why not."""
-        return self._with_choice_of(finalist.trial)._certified(finalist.trial)
+        trial = finalist.trial
+        return self._with_choice_of(trial)._certified(trial.number, *layout_of(trial))
+
+    def learned(self, result: CandidateResult) -> CandidateResult:
+        """A certified program improved again with the detours that its transfers take, while it becomes shorter."""
+        finish, best = self, result
+        for _ in range(LEARNED):
+            phases, problem = finish.ready.phases, finish.ready.coarse
+            point = problem.evaluate(best.x, best.start)
+            if phases is None or not isinstance(problem, ProgramProblem) or point is None or best.program is None:
+                break
+            phases = phases.with_detours(problem, point, best.program.solution)
+            finish = replace(self, ready=replace(self.ready, phases=phases))
+            self.progress(f"certifying trial {result.trial} with the detours of its transfers", 1.0)
+            again = finish._certified(result.trial, best.x, best.start)
+            again = replace(again, solves=best.solves + again.solves)
+            if not again.passed or again.cycle > (1.0 - SHORTER) * best.cycle:
+                return min(again, replace(best, solves=again.solves), key=lambda one: (not one.passed, one.cycle))
+            best = again
+        return best
 
     def _with_choice_of(self, trial: StudyTrial) -> Self:
         """The finish of layouts with the discrete choices of a trial."""
         choice = choice_of(trial)
         return replace(self, ready=prepared(self.ready.request, choice), choice=choice)
 
-    def _certified(self, trial: StudyTrial) -> CandidateResult:
+    def _certified(self, trial: int, x: Array, start: Array) -> CandidateResult:
         """See ``certified``; the cell is made ready with the choices of the trial."""
-        (x, start), refinement = layout_of(trial), _Refinement()
+        refinement = _Refinement()
         for solves in count(1):
             timed = self._refined(x, start, refinement, is_first=solves == 1)
             x, start, program, reason = timed.x, timed.start, timed.program, timed.reason
@@ -172,7 +194,7 @@ class Finish:
                     self.ready, timed.standing, program
                 )
             result = CandidateResult(
-                trial=trial.number,
+                trial=trial,
                 x=x,
                 start=start,
                 program=program,

@@ -1,27 +1,30 @@
 """The phases of a program with work, made ready for a search: their jobs, starts and bodies, and what lies between."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.cell.cell import Cell
 from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.cell.layout import VariableKind
 from cellplan.planning.sequence.stages import Stage, program_stages
 from cellplan.runs.plan.retiming import transfer_retimer
 from cellplan.runs.plan.sequence import PlannedProgram, PlannedStage, plan_work
+from cellplan.runs.solution import Solution
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import MOST, Job, enough_nodes
 from cellplan.search.programs.layout_problem import LayoutProblem
+from cellplan.search.programs.problem import Point
 from cellplan.search.programs.program_problem import ProgramProblem
 from cellplan.search.programs.transfers import HOME, Transfers
 from cellplan.search.variables.phase_variables import PhaseVariables
 from cellplan.search.variables.variables import Variables
 from cellplan.search.variables.written import written_start, written_task_start
 
+SAME: Final = 1e-4  # [rad] or [m] within which a home that is found is the start of a phase
 FEWER: Final = 4  # [-] times fewer nodes of a straight move that grips or puts down the part
 
 
@@ -33,6 +36,7 @@ class ProgramPhases:
     variables: Variables  # what may change
     bodies: tuple[CellDistances, ...]  # the bodies of each phase
     between: tuple[CellDistances, ...]  # the bodies during each transfer
+    detours: tuple[float, ...] = ()  # see ``Transfers``; empty while none are known
 
     @classmethod
     def of(cls, cell: Cell, variables: Variables, bodies: CellDistances) -> "ProgramPhases":
@@ -82,7 +86,9 @@ class ProgramPhases:
             self._phase_problem(planned, bodies, nodes)
             for planned, bodies in zip(self.work.stages, self.bodies, strict=True)
         ]
-        return ProgramProblem(phases=tuple(phases), transfers=self._transfers([len(it.times) for it in phases]))
+        transfers = self._transfers([len(it.times) for it in phases])
+        idle = [self._is_idle(planned) for planned in self.work.stages]
+        return ProgramProblem(phases=tuple(phases), transfers=transfers, homes=np.where(idle, self._homes, HOME))
 
     def _phase_problem(self, planned: PlannedStage, bodies: CellDistances, nodes: int) -> LayoutProblem:
         """The problem of one phase; the tools follow their paths in the given layout, as its plan has shown."""
@@ -114,14 +120,37 @@ class ProgramPhases:
             values |= written_start(base, base.robot(name), self.variables.state(x).starts[base.columns(name)])
         return values
 
+    @property
+    def _homes(self) -> Indices:
+        """The phase at whose start each joint is at a home that is found; or ``HOME`` where it is elsewhere, (nq,)."""
+        cell, homes = self.work.cell, np.full(self.work.cell.joint_count, HOME)
+        at_home = np.concatenate([robot.home for robot in cell.robots if robot.home is not None])
+        is_open = {robot.name for robot in self.variables.base.robots if robot.home is None}
+        for number, planned in reversed(list(enumerate(self.work.stages))):
+            for name in is_open.intersection(planned.stage.phase.roles) if planned.stage.move is None else ():
+                columns = cell.columns(name)
+                is_there = np.allclose(planned.motion.q[0, columns], at_home[columns], rtol=0.0, atol=SAME)
+                if is_there and name not in planned.stage.phase.idle:
+                    homes[columns] = number
+        return homes
+
+    def _is_idle(self, planned: PlannedStage) -> Flags:
+        """The joints of the robots that are idle in a phase, shape (nq,)."""
+        is_idle = np.zeros(self.work.cell.joint_count, dtype=bool)
+        for name in planned.stage.phase.idle:
+            is_idle[self.work.cell.columns(name)] = True
+        return is_idle
+
+    def with_detours(self, problem: ProgramProblem, point: Point, solution: Solution) -> Self:
+        """The same with the detours that the transfers of a solved program take, from a point near it."""
+        names = {stage.phase.name for stage in _transfer_stages(self.work)}
+        seconds = [run.report.cycle_time for run in solution.runs if run.phase.name in names]
+        return replace(self, detours=tuple(problem.transfers.learned(point.x, point.q, seconds).detours.tolist()))
+
     def _transfers(self, counts: list[int]) -> Transfers:
         """The transfers between the phases with so many nodes, from home and back home."""
         cell, firsts = self.work.cell, np.cumsum([0, *counts])
-        homes = np.full(cell.joint_count, HOME)
-        free = next((number for number, it in enumerate(self.work.stages) if _begins_there(it)), None)
-        for robot in self.variables.base.robots:
-            if robot.home is None and robot.name in cell.positioners and free is not None:
-                homes[cell.columns(robot.name)] = firsts[free]  # its home is its start
+        homes = np.where(self._homes == HOME, HOME, firsts[self._homes])
         ends, number, last = [], 0, homes
         for stage in program_stages(cell):
             if stage.phase.tasks:
@@ -138,6 +167,7 @@ class ProgramPhases:
             bounds=retimer.bounds,
             bodies=self.between,
             step=retimer.step,
+            detours=np.array(self.detours or [1.0] * len(ends)),
         )
 
 

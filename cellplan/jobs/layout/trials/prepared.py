@@ -1,6 +1,6 @@
 """A cell made ready for a layout search: its variables, its bodies, and its job at as many nodes as are asked for."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, Final
@@ -288,14 +288,21 @@ def _with_solved_start(ready: PreparedSearch) -> PreparedSearch:
     return replace(ready, variables=replace(variables, given=given), solved_start=start)
 
 
-def prepared(request: LayoutRequest, choice: Mapping[str, object] | None = None) -> PreparedSearch:
-    """The cell of a request, with the discrete choices of one trial; made once in each process."""
-    return _prepared(request, tuple(sorted((choice or {}).items())))
+def prepared(
+    request: LayoutRequest, choice: Mapping[str, object] | None = None, detours: Sequence[float] = ()
+) -> PreparedSearch:
+    """The cell of a request, with the discrete choices and detours of one trial; made once in each process."""
+    return _prepared(request, tuple(sorted((choice or {}).items())), tuple(detours))
 
 
 @lru_cache(maxsize=8)
-def _prepared(request: LayoutRequest, choice: tuple[tuple[str, object], ...]) -> PreparedSearch:
+def _prepared(
+    request: LayoutRequest, choice: tuple[tuple[str, object], ...], detours: tuple[float, ...]
+) -> PreparedSearch:
     """See ``prepared``."""
+    if detours:
+        ready = _prepared(request, choice, ())
+        return ready if ready.phases is None else replace(ready, phases=replace(ready.phases, detours=detours))
     cell = searched_cell(request)
     if choice:
         cell = cell.with_values(dict(choice))

@@ -45,6 +45,7 @@ class Proposal:
     unled: Mapping[str, Any] | None = None  # ``x`` and ``start`` of the motion without the joint path that it led to
     clearance_m: float | None = None  # clearance beyond what is demanded
     give_up_above_s: float | None = None  # cycle above which it is given up on its way
+    detours: Sequence[float] | None = None  # of the transfers of a program, see ``Transfers``
 
     @classmethod
     def of_trial(cls, trial: StudyTrial) -> "Proposal":
@@ -81,10 +82,11 @@ class Proposals:
     choices: Sequence[Mapping[str, object]] = ({},)  # combinations of discrete choices, tried in turn
     branches: Sequence[Mapping[str, Any]] = ()  # other starts of the given layout: ``x`` and ``start``
     rejected: frozenset[int] = frozenset()  # trials that are no candidates any more
+    detours: Sequence[float] | None = None  # of the transfers of the given program; None where they are not known
 
     def __call__(self, finished: Sequence[StudyTrial]) -> list[dict[str, Any]]:
         """Values of the trials of the next round."""
-        return [proposal.values for proposal in self.next_round(finished)]
+        return [replace(proposal, detours=self.detours).values for proposal in self.next_round(finished)]
 
     def next_round(self, finished: Sequence[StudyTrial]) -> list[Proposal]:
         """What the next round tries."""

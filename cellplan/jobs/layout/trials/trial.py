@@ -62,7 +62,7 @@ def _evaluated(request: LayoutRequest, number: int, text: str) -> TrialOutcome:
     """See ``evaluate``; the values of the trial as JSON."""
     proposal = Proposal(**json.loads(text))
     try:
-        ready = prepared(request, proposal.choice)
+        ready = prepared(request, proposal.choice, proposal.detours or ())
         begin = _begin(ready, proposal, number)
     except (InputError, NoSolutionError) as error:
         return TrialOutcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
