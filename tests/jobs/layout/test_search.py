@@ -2,14 +2,17 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from builders.layout_search import CELL, SETTINGS, searched_pair
+from builders.study_trials import InThisProcess
 from jsonschema import Draft202012Validator
 
 from cellplan import CellplanError, LayoutRequest, LayoutResult, Stop, load_cell, search_layout, solve
+from cellplan.jobs.layout.finish.finish import Finish
 from cellplan.jobs.layout.record import layout_schema
 from cellplan.jobs.layout.result import layout_lines
 from cellplan.study.folder import prepare_folder
@@ -81,6 +84,23 @@ def test_the_cycle_is_the_shortest_of_this_motion(searched: LayoutResult, folder
 
     assert searched.record["given"]["status"] in {"conforming", "violating"}
     assert not solve(faster).passed
+
+
+def test_a_given_layout_that_is_not_beaten_is_the_result(
+    searched: LayoutResult, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert searched.best is not None
+    rejected = replace(searched.best, reason="nothing passes")
+    monkeypatch.setattr(Finish, "certified", lambda *_: rejected)
+    best = folder / "study" / "best.yaml"
+    request = LayoutRequest(cell=best, vary=("right.base={x_mm: [1500, 2300], y_mm: [0, 600]}",), margin=9.9)
+
+    result = search_layout(request, folder / "again", stop=Stop(trials=1), workers=InThisProcess())
+
+    assert result.record["best"] is not None
+    assert result.record["best"]["cycle_s"] == result.record["given"]["cycle_s"]
+    assert any(remark.startswith("no gain: nothing better") for remark in result.record["remarks"])
+    assert solve(load_cell(folder / "again" / "best.yaml")).motion.times[-1] == result.record["best"]["cycle_s"]
 
 
 def test_record_page_and_console_say_the_same(searched: LayoutResult, folder: Path) -> None:
