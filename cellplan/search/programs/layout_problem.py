@@ -10,7 +10,6 @@ from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.frozen import derive
 from cellplan.model.cell.cell import joint_at
 from cellplan.model.motion.motion import Schedule
-from cellplan.model.robot.robot import JointLimits
 from cellplan.scene.near import NearPairs
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.derivatives import differentiate
@@ -18,34 +17,23 @@ from cellplan.search.kernel.job import Job, enough_nodes
 from cellplan.search.kernel.run import run, run_near
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
-from cellplan.search.programs.problem import Distances, Point, PointDerivatives
+from cellplan.search.programs.problem import VARIED, Distances, Point, PointDerivatives, ProblemFields
 from cellplan.search.programs.transfers import Transfers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LayoutProblem:
+class LayoutProblem(ProblemFields):
     """See ``Problem``."""
 
     job: Job  # the job at its nodes
     variables: KernelVariables  # what may vary
     bodies: CellDistances
     acceleration: Array  # see ``Problem``
-    names: tuple[str, ...] = field(init=False)
-    lower: Array = field(init=False)
-    upper: Array = field(init=False)
-    scale: Array = field(init=False)
-    cost: Array = field(init=False)
-    given: Array = field(init=False)
-    times: Array = field(init=False)
-    limits: JointLimits = field(init=False)
-    transfers: Transfers = field(init=False)
-    is_dense: bool = field(init=False, default=False)
     is_accelerating: bool = field(init=False)
 
     def __post_init__(self) -> None:
         """Note what the variables and the job know, and whether accelerations count."""
-        names = ("names", "lower", "upper", "scale", "cost", "given")
-        derive(self, **{name: getattr(self.variables, name) for name in names})
+        derive(self, **{name: getattr(self.variables, name) for name in VARIED})
         is_accelerating = bool(np.isfinite(self.acceleration).any())
         derive(self, times=self.job.times, limits=self.job.limits, is_accelerating=is_accelerating)
         derive(self, transfers=Transfers.none(self.job.cell.joint_count, nodes=len(self.times)))

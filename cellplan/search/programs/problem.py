@@ -1,7 +1,7 @@
 """Problem: what sequential programs know of what they improve; a whole layout, the path of a positioner, or both."""
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import Final, Protocol
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.robot.robot import JointLimits
@@ -111,3 +111,22 @@ class Problem(Varied, Protocol):
 
     def joint_names(self, column: int) -> tuple[str, str]:
         """Names of the robot and the joint at a place of the stacked joints."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProblemFields:
+    """What every problem works out when it is made; see ``Problem``."""
+
+    names: tuple[str, ...] = field(init=False)
+    lower: Array = field(init=False)
+    upper: Array = field(init=False)
+    scale: Array = field(init=False)
+    cost: Array = field(init=False)
+    given: Array = field(init=False)
+    times: Array = field(init=False)
+    limits: JointLimits = field(init=False)
+    transfers: Transfers = field(init=False)
+    is_dense: bool = field(init=False, default=False)
+
+
+VARIED: Final = ("names", "lower", "upper", "scale", "cost", "given")  # those that are of the variables

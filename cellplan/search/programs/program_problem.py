@@ -9,37 +9,26 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.frozen import derive
-from cellplan.model.robot.robot import JointLimits
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.programs.layout_problem import LayoutProblem
-from cellplan.search.programs.problem import Distances, Point, PointDerivatives
+from cellplan.search.programs.problem import VARIED, Distances, Point, PointDerivatives, ProblemFields
 from cellplan.search.programs.transfers import HOME, Transfers
 
 FAR_FROM_SINGULAR: Final = 1e6  # [m] and [rad] in place of singular values of arms that are not at work
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ProgramProblem:
+class ProgramProblem(ProblemFields):
     """See ``Problem``; the nodes of all phases follow one another, and so do their P start postures, shape (P nq,)."""
 
     phases: tuple[LayoutProblem, ...]  # the problems of its phases, P of them
     transfers: Transfers  # what leads from each to the next
     homes: Indices  # phases at whose start the joints stand that are idle, or ``HOME`` where they do not, (P, nq)
-    names: tuple[str, ...] = field(init=False)
-    lower: Array = field(init=False)
-    upper: Array = field(init=False)
-    scale: Array = field(init=False)
-    cost: Array = field(init=False)
-    given: Array = field(init=False)
     acceleration: Array = field(init=False)
-    times: Array = field(init=False)
-    limits: JointLimits = field(init=False)
-    is_dense: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         """Put the nodes of the phases one after the other."""
-        shared = ("names", "lower", "upper", "scale", "cost", "given", "acceleration", "limits")
-        derive(self, **{name: getattr(self.phases[0], name) for name in shared})
+        derive(self, **{name: getattr(self.phases[0], name) for name in (*VARIED, "acceleration", "limits")})
         begins = accumulate((float(phase.times[-1]) for phase in self.phases), initial=0.0)
         times = [begin + phase.times for begin, phase in zip(begins, self.phases, strict=False)]
         derive(self, times=np.concatenate(times))

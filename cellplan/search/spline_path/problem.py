@@ -17,7 +17,6 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.frozen import derive
 from cellplan.model.cell.cell import joint_at
-from cellplan.model.robot.robot import JointLimits
 from cellplan.scene.kinematics.batched import Placement
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.jacobian_changes import JacobianChanges
@@ -26,7 +25,7 @@ from cellplan.search.kernel.screws import Directions, TaskScrews
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
 from cellplan.search.programs.layout_problem import PairsAtNodes, distances_at
-from cellplan.search.programs.problem import Distances, Point, PointDerivatives
+from cellplan.search.programs.problem import Distances, Point, PointDerivatives, ProblemFields
 from cellplan.search.programs.transfers import Transfers
 from cellplan.search.spline_path.nodes import PathNodes
 from cellplan.search.spline_path.variables import PathVariables
@@ -46,7 +45,7 @@ class WrittenVariables(KernelVariables, Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PathProblem:
+class PathProblem(ProblemFields):
     """See ``Problem``: the coefficients of the path are the first variables, those of the layout the others."""
 
     nodes: PathNodes  # the job at its nodes
@@ -54,16 +53,7 @@ class PathProblem:
     layout: WrittenVariables  # what else may vary
     bodies: CellDistances
     acceleration: Array  # see ``Problem``
-    names: tuple[str, ...] = field(init=False)
-    lower: Array = field(init=False)
-    upper: Array = field(init=False)
-    scale: Array = field(init=False)
-    cost: Array = field(init=False)
-    given: Array = field(init=False)
     is_dense: bool = field(init=False, default=True)  # its nodes are cheap; wrists near a singularity make peaks narrow
-    times: Array = field(init=False)
-    limits: JointLimits = field(init=False)
-    transfers: Transfers = field(init=False)
 
     def __post_init__(self) -> None:
         """Put the variables one after the other."""
