@@ -132,8 +132,8 @@ class LayoutEntry(Entry):
         "{coefficients: 14, degree: 5}; ROBOT.branch: true; tasks.TASK.spin_deg: true or [low, high]; "
         "tasks.TASK.robot: [ROBOT, …]; part.held_by[0].at, part.at: ranges as of a base; motion.mode: [MODE, …]. When "
         "absent: the bases of all operators (x and y within 1 m, and from beyond 2.5 m on to 0.5 m from the first "
-        "holder or the part at rest; z between 0 and 600 mm unless they stand on a floor; any yaw) and the start "
-        "posture of the first holder.",
+        "holder or the part at rest; z between 0 and 600 mm unless they stand on a floor; any yaw), that of the "
+        "first holder likewise where program has attach or detach, and its start posture.",
     )
     fixed: tuple[Text, ...] = Field(
         default=(), max_length=ITEM_LIMIT, description="Addresses that stay as they are, whatever vary says."

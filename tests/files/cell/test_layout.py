@@ -59,6 +59,16 @@ def test_without_ranges_the_operators_and_the_first_start_vary(load: Load) -> No
     assert {it.address: (it.lower, it.upper) for it in raised.ranges}["robots.worker.base.z_mm"] == (0.0, 0.7)
 
 
+def test_without_ranges_a_holder_that_grips_the_part_at_a_place_moves_too(load: Load) -> None:
+    gripping = load_cell(Path(__file__).resolve().parents[3] / "cells" / "three_tasks_each.yaml").layout
+    held = load().layout
+    assert gripping is not None
+    assert held is not None
+    moved = [it.address for it in gripping.ranges if it.address.startswith("robots.holder.base")]
+    assert moved == [f"robots.holder.base.{key}" for key in ("x_mm", "y_mm", "yaw_deg")]
+    assert not any(it.address.startswith("robots.holder.base") for it in held.ranges)
+
+
 def test_without_ranges_a_base_far_away_may_come_to_the_holder(load: Load) -> None:
     layout = load(("xyz_mm: [2000, 0, 0]", "xyz_mm: [-4000, 2400, 0]")).layout
     assert layout is not None
