@@ -22,6 +22,13 @@ class AssignOptions(Options):
         Path | None, option("-o, --output DIR", "Folder (default: outputs/NAME-assign, NAME that of the cell).")
     ] = None
     effort: Annotated[int, option("--effort N", "Work of the solver: 1 quick, 2 usual, 5 very long.", min=1, max=5)] = 2
+    stations: Annotated[
+        int | None,
+        option("--stations N", "Poses of the part in use at most, instead of assign.most_stations.", min=1, max=40),
+    ] = None
+    only_bound: Annotated[
+        bool, option("--only-bound", "Stop after the block model: a lower bound of the cycle, and no program.")
+    ] = False
     with_view: Annotated[bool, option("--view", "Write the 3-D page of the program too, run/view.html.")] = False
     as_json: AsJson = False
     quiet: Quiet = False
@@ -38,15 +45,22 @@ def assign(options: AssignOptions) -> Result:
     """
     from cellplan.files.run.folder import refuse_unless_replaceable
     from cellplan.jobs.assign.assign import assign as assigned
+    from cellplan.jobs.assign.assign import assignment_bound
     from cellplan.jobs.assign.draft import AssignmentDraft
-    from cellplan.jobs.assign.result import assign_lines, write_assignment
+    from cellplan.jobs.assign.result import assign_lines, bound_lines, bound_record, write_assignment, write_bound
     from cellplan.jobs.view.write import write_view_of_run
 
     draft = AssignmentDraft.load(options.cell, allow_dirs=options.allow_dirs)
     folder = options.output or Path("outputs") / f"{draft.cell.name}-assign"
     refuse_unless_replaceable(folder)
     with progress_listener(quiet=options.quiet) as progress:
-        assignment = assigned(draft, effort=options.effort, progress=progress)
+        if options.only_bound:
+            bound = assignment_bound(draft, effort=options.effort, stations=options.stations, progress=progress)
+            of_bound = bound_record(bound)
+            write_bound(of_bound, folder)
+            about: dict[str, object] = {"exit": int(ExitStatus.PASSED), "folder": str(folder)}
+            return Result(ExitStatus.PASSED, bound_lines(of_bound), {**of_bound, **about})
+        assignment = assigned(draft, effort=options.effort, stations=options.stations, progress=progress)
         record = write_assignment(assignment, options.cell, folder, progress=progress)
         if options.with_view:
             write_view_of_run(folder / "run", assignment.cell, progress=progress)

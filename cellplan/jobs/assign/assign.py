@@ -6,41 +6,26 @@ again.
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final
 
 from cellplan.errors import ImpossibleTasksError, NoSolutionError
-from cellplan.jobs.assign.columns import verified_columns
 from cellplan.jobs.assign.draft import AssignmentDraft
-from cellplan.jobs.assign.written import mirrored_goals, written_cell, written_points
+from cellplan.jobs.assign.search import AssignmentSearch
+from cellplan.jobs.assign.written import written_cell
 from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
-from cellplan.runs.plan.retiming import joint_bounds, transfer_retimer
 from cellplan.runs.solution import Run, Solution
 from cellplan.runs.solve import solve
-from cellplan.scene.scene import Scene
-from cellplan.search.assign.blocks import BlockAnswer, solve_blocks
-from cellplan.search.assign.clearance import AssignmentClearance
-from cellplan.search.assign.durations import with_stand_offs
-from cellplan.search.assign.goals import TaskGoal, task_goals
-from cellplan.search.assign.greedy import greedy_schedule, improved
-from cellplan.search.assign.instance import Instance, find_conflicts, least_transfer, with_rules
-from cellplan.search.assign.moving_blocks import joint_angles, with_columns
-from cellplan.search.assign.order import SequencedBlocks, Sequencer
-from cellplan.search.assign.refined import Refinement
-from cellplan.search.assign.rules import TaskRules, tasks_before
-from cellplan.search.assign.solver import is_installed
-from cellplan.search.assign.stations import choose_stations
-from cellplan.search.assign.table import Key, ModeSearch, ModeTable, TaskMode
-from cellplan.search.assign.transfers import TransferCertifier
+from cellplan.search.assign.blocks import BlockAnswer
+from cellplan.search.assign.instance import Instance
+from cellplan.search.assign.order import SequencedBlocks
 
 ROUNDS: Final = 4  # programs that are solved until one passes
-EFFORT: Final = (2.0, 5.0, 15.0, 60.0, 240.0)  # of the block model, in units of deterministic time, by --effort
 NEARLY: Final = 1.05  # [-] of the cycle of the program: so long are those of its alternatives at most
-LOOKED_FOR: Final = ("torch and weld position", "reach", "joint limits", "path", "tool by the part", "collisions")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,10 +44,11 @@ class Assignment(Presented):
         greedy: Cycle in [s] of the greedy schedule, scarce tasks first, by the model.
         alternatives: Other schedules of the first round that are nearly as good by the model, the best one first; they
             are not certified.
-        without: Cycle in [s] by the model without each robot; None where it has to work.
+        without: Cycle in [s] by the model without each robot, its transfers certified; None where it has to work.
         rounds: Number of programs that were solved.
         counts: Numbers of goals, modes, certificates and refusals.
         left_out: Why tasks are not in the program, one line for each; empty where it has all.
+        with_more: Cycle in [s] by the model with each robot that is not available; None where there is no schedule.
     """
 
     draft: Cell
@@ -78,6 +64,7 @@ class Assignment(Presented):
     rounds: int
     counts: Mapping[str, int]
     left_out: tuple[str, ...] = ()
+    with_more: Mapping[str, float | None] = field(default_factory=dict)
 
     @property
     def passed(self) -> bool:
@@ -101,7 +88,48 @@ class Assignment(Presented):
         return f"<Assignment of '{self.cell.name}': {self.cycle:.4g} s{bound}; {verdict}>"
 
 
-def assign(draft: AssignmentDraft, *, effort: int = 2, progress: Progress = silent) -> Assignment:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AssignmentBound:
+    """What the block model of an assignment comes to before anything is certified.
+
+    Attributes:
+        draft: The cell that was given, each open task with the first of its robots.
+        instance: What is chosen from.
+        answer: Its best schedule by the model, and the bound.
+        counts: Numbers of goals, modes and conflicts.
+    """
+
+    draft: Cell
+    instance: Instance
+    answer: BlockAnswer
+    counts: Mapping[str, int]
+
+
+def assignment_bound(
+    draft: AssignmentDraft, *, effort: int = 2, stations: int | None = None, progress: Progress = silent
+) -> AssignmentBound:
+    """The lower bound of a draft, with no program.
+
+    Args:
+        draft: The cell with open tasks.
+        effort: Work of the block model, from 1 to 5.
+        stations: Number of poses of the part in use at most; that of the draft when None.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: Something in the cell cannot be assigned.
+        NoSolutionError: A task can be done by no robot at any pose of the part, or no schedule keeps all rules.
+    """
+    progress("table of modes", 0.0)
+    search = AssignmentSearch(draft, effort, most_stations=stations)
+    instance = search.instance(progress)
+    progress("blocks", 0.0)
+    return AssignmentBound(draft=draft.cell, instance=instance, answer=search.blocks(instance), counts=search.counts)
+
+
+def assign(
+    draft: AssignmentDraft, *, effort: int = 2, stations: int | None = None, progress: Progress = silent
+) -> Assignment:
     """Choose robots, order, directions, spins and poses of the part for all tasks.
 
     Without OR-Tools blocks are improved by exchanges alone, and no lower bound is known. Where a robot is not available
@@ -110,25 +138,41 @@ def assign(draft: AssignmentDraft, *, effort: int = 2, progress: Progress = sile
     Args:
         draft: The cell with open tasks.
         effort: Work of the block model, from 1 to 5.
+        stations: Number of poses of the part in use at most; that of the draft when None.
         progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: Something in the cell cannot be assigned.
         NoSolutionError: A task can be done by no robot at any pose of the part, or no program passed.
     """
+
+    def searched(given: AssignmentDraft) -> AssignmentSearch:
+        progress("table of modes", 0.0)
+        return AssignmentSearch(given, effort, most_stations=stations)
+
+    left_out: tuple[str, ...] = ()
     try:
-        return _program_of(draft, effort, progress)
+        assignment = _program_of(searched(draft), progress)
     except ImpossibleTasksError as error:
-        partial = draft.without(error.tasks)
+        partial, left_out = draft.without(error.tasks), tuple(error.findings)
         if partial is None:
             raise
-        return replace(_program_of(partial, effort, progress), left_out=tuple(error.findings))
+        assignment = _program_of(searched(partial), progress)
+    more = {name: _cycle_of(searched(draft.with_robot(name)), progress) for name in draft.absent}
+    return replace(assignment, left_out=left_out, with_more=more)
 
 
-def _program_of(draft: AssignmentDraft, effort: int, progress: Progress) -> Assignment:
+def _cycle_of(search: AssignmentSearch, progress: Progress) -> float | None:
+    """Cycle of a draft in [s] by the model; None where there is no schedule."""
+    try:
+        return search.cycle(search.instance(progress))
+    except ImpossibleTasksError:
+        return None
+
+
+def _program_of(search: AssignmentSearch, progress: Progress) -> Assignment:
     """The program of all tasks of a draft."""
-    progress("table of modes", 0.0)
-    search = _Search(draft, effort)
+    draft = search.draft
     first = instance = search.instance(progress)
     counts = search.counts
     for number in range(1, ROUNDS + 1):
@@ -161,142 +205,6 @@ def _program_of(draft: AssignmentDraft, effort: int, progress: Progress) -> Assi
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Planned:
-    """A schedule with its modes, and what is known of it."""
-
-    sequenced: SequencedBlocks
-    bound: int | None  # [steps]
-    is_proved: bool
-    greedy: int  # [steps]
-    others: tuple[SequencedBlocks, ...]  # other schedules
-    examined: int
-    refused: int
-
-
-class _Search:
-    """The search of one draft."""
-
-    def __init__(self, draft: AssignmentDraft, effort: int) -> None:
-        self.draft, self._effort = draft, EFFORT[effort - 1]
-        self._scene = Scene.from_cell(draft.cell)
-        self.counts: dict[str, int] = {}
-
-    def instance(self, progress: Progress) -> Instance:
-        """Stations, modes and conflicts.
-
-        Raises:
-            NoSolutionError: A task can be done nowhere.
-        """
-        draft, settings = self.draft, self.draft.settings
-        cell, stations = draft.cell, draft.stations()
-        goals = [self._as_given(goal) for goal in task_goals(cell, draft.robots)]
-        clearance = AssignmentClearance(
-            scene=self._scene, home=draft.home, stations=stations, conflict=settings.conflict_mm.si
-        )
-        directed, fits = [*goals, *mirrored_goals(draft, goals)], clearance.tool_fits
-        search = ModeSearch(cell=cell, goals=directed, stations=stations, spins=draft.spins(), tool_fits=fits)
-        table = search.table()
-        certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))
-        self._refinement = Refinement(search=search, clearance=clearance, certifier=certifier)
-        progress("stations", 0.0)
-        rules = TaskRules.of(cell)
-        used, modes = choose_stations(table, goals, clearance, most=settings.most_stations, rules=rules)
-        columns = verified_columns(draft, goals, self._scene, progress) if settings.groups else []
-        able = {it.task for column in columns for it in column.modes} | {task for task, _, _ in modes}
-        refuse_impossible_tasks(draft, goals, table, able)
-        progress("conflicts", 0.0)
-        joints, bounds = {it.name: cell.columns(it.name) for it in cell.robots}, transfer_retimer(self._scene).bounds
-        instance = Instance(
-            goals={goal.name: self._timed(goal, modes) for goal in goals},
-            robots=draft.operators,
-            modes=modes,
-            stations=stations,
-            used=used,
-            conflicts=find_conflicts(modes, clearance),
-            homes={name: draft.home[at] for name, at in joints.items()},
-            bounds={name: bounds.of(at) for name, at in joints.items()},
-            step=cell.motion.step,
-        )
-        instance = with_rules(with_columns(instance, columns), rules)
-        self.counts = {
-            "tasks": len(goals),
-            "poses": len(stations.q),
-            "modes": sum(map(len, table.modes.values())),
-            "stations": len(used),
-            "free_modes": sum(map(len, modes.values())),
-            "conflicts": len(instance.conflicts),
-        } | ({"moving_blocks": len(columns)} if settings.groups else {})
-        return instance
-
-    def planned(self, instance: Instance, *, is_refined: bool) -> _Planned:
-        """The best schedule of an instance, with certified transfers."""
-        sequencer, least = Sequencer(instance), least_transfer(instance)
-        greedy = greedy_schedule(instance)
-        nearest = sequencer.sequenced(greedy).steps
-        exchanged = sequencer.ordered(improved(instance, greedy)).schedule
-        answer = BlockAnswer(schedule=None, bound=None, is_proved=False)
-        if is_installed():
-            answer = solve_blocks(instance, least=least, effort=self._effort, hint=exchanged)
-        certifier = self._refinement.certifier
-        schedules = [exchanged] if answer.schedule is None else [exchanged, answer.schedule]
-        certified = sorted((certifier.best(sequencer, it) for it in schedules), key=lambda it: it.steps)
-        best, refined = certified[0], instance
-        if is_refined:
-            best, refined = self._refinement.shortened(best, sequencer)
-        bound = answer.bound
-        if bound is not None and (shorter := least_transfer(refined)) < least:
-            bound = solve_blocks(refined, least=shorter, effort=self._effort, hint=best.schedule).bound
-        return _Planned(
-            sequenced=best,
-            bound=bound,
-            is_proved=answer.is_proved,
-            greedy=nearest,
-            others=(*certified[1:], *map(sequencer.ordered, answer.others)),
-            examined=certifier.examined,
-            refused=len(sequencer.refusals),
-        )
-
-    def without(self, instance: Instance, robot: str) -> float | None:
-        """Cycle in [s] by the model if a robot did no task, its transfers straight; None where a task is its alone."""
-        others = instance.without(robot)
-        if others.tasks != instance.tasks:
-            return None
-        try:
-            schedule = improved(others, greedy_schedule(others))
-        except NoSolutionError:  # the rules between tasks
-            return None
-        if is_installed():
-            least = least_transfer(others)
-            schedule = solve_blocks(others, least=least, effort=EFFORT[0], hint=schedule).schedule or schedule
-        return Sequencer(others).ordered(schedule).steps * others.step
-
-    def _timed(self, goal: TaskGoal, modes: Mapping[Key, Sequence[TaskMode]]) -> TaskGoal:
-        """The goal with the time that it takes at least where its program is retimed."""
-        cell = self.draft.cell
-        if cell.motion.timing is Timing.AS_WRITTEN:
-            return goal
-        limits = {robot.name: joint_bounds(cell).of(cell.columns(robot.name)) for robot in cell.robots}
-        return with_stand_offs(goal, modes, limits, cell.motion.step)
-
-    def _as_given(self, goal: TaskGoal) -> TaskGoal:
-        """The goal with what its task states, and with what is not free: direction, spin, station and start."""
-        cell, free = self.draft.cell, self.draft.settings.free
-        task, holder = cell.task(goal.name), cell.positioners[:1]
-        station = task.holder_posture
-        if station is None and holder and "station" not in free:
-            station = self.draft.holder_start
-        is_free = "direction" in free and task.start_posture is None and written_points(cell, goal.name) is not None
-        return replace(
-            goal,
-            after=tasks_before(cell)[goal.name],
-            is_reversible=goal.is_reversible and is_free,
-            holder_q=station,
-            start_q=task.start_posture,
-            is_spin_free=f"tasks.{goal.name}.spin_deg" not in cell.origin.lines,
-        )
-
-
 def has_open_rests(cell: Cell, instance: Instance) -> bool:
     """Whether tasks rest for each other whose times only the solve of the program decides: no bound counts these."""
     return bool(instance.rules.lags) and cell.motion.timing is not Timing.AS_WRITTEN
@@ -309,28 +217,6 @@ def alternatives_to(best: SequencedBlocks, others: Iterable[SequencedBlocks]) ->
         if other.steps <= NEARLY * best.steps:
             different.setdefault(other.schedule.identity, other)
     return tuple(different.values())[1:]
-
-
-def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table: ModeTable, able: set[str]) -> None:
-    """Refuse tasks that no robot can do at any pose of the part, each with the filter that dropped it.
-
-    Raises:
-        ImpossibleTasksError: One line for each of them.
-    """
-    lines = []
-    for goal in goals:
-        if goal.name not in able:
-            counts: Mapping[str, int] = table.counts.get(goal.name, {})
-            dropped = next((name for name in LOOKED_FOR if not counts.get(name)), LOOKED_FOR[-1])
-            names = ", ".join(goal.robots)
-            turns = draft.may_move_part and not draft.settings.groups and joint_angles(draft.cell, goal) is not None
-            cure = "write assign.groups: true, so that the part turns meanwhile, or " if turns else ""
-            lines.append(
-                f"{draft.cell.task(goal.name).where()}: none of {names} can do it at any pose of the part: nothing is "
-                f"left after the filter '{dropped}'; {cure}give more poses of the part, other robots or bases"
-            )
-    if lines:
-        raise ImpossibleTasksError(lines, [goal.name for goal in goals if goal.name not in able])
 
 
 def _solved(cell: Cell, progress: Progress) -> Solution | str:

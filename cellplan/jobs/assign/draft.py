@@ -10,6 +10,8 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.files.cell.load import load_open_cell
+from cellplan.files.cell.open_tasks import open_tasks
+from cellplan.files.yaml.reader import read_yaml
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Mode, Robot, Timing
@@ -66,8 +68,7 @@ class AssignmentDraft:
         left_out = set(tasks)
         while more := {it.name for it in self.cell.tasks if left_out.intersection(it.after)} - left_out:
             left_out |= more
-        robots: Any = self.cell.origin.document["robots"]
-        if all(it.get("available", True) for it in robots.values()) or len(left_out) == len(self.cell.tasks):
+        if not self.absent or len(left_out) == len(self.cell.tasks):
             return None
         try:
             cell = self.cell.with_values({f"tasks.{name}": None for name in left_out})
@@ -76,14 +77,29 @@ class AssignmentDraft:
         return replace(self, cell=cell, robots={name: it for name, it in self.robots.items() if name not in left_out})
 
     @property
+    def absent(self) -> tuple[str, ...]:
+        """Robots that are not available."""
+        robots: Any = self.cell.origin.document["robots"]
+        return tuple(name for name, robot in robots.items() if not robot.get("available", True))
+
+    def with_robot(self, name: str) -> "AssignmentDraft":
+        """The draft if a robot were available: its tasks are its alone, and open ones are open to it too."""
+        root = read_yaml(self.file, file=str(self.file)).root
+        robot = {**root["robots"][name], "available": True}
+        opened = open_tasks({**root, "robots": {**root["robots"], name: robot}})
+        robots = {task: opened.get(task, (name,)) for task in self.robots}
+        return replace(self, cell=self.cell.with_values({f"robots.{name}.available": True}), robots=robots)
+
+    @property
     def settings(self) -> AssignEntry:
         """What may be chosen."""
         return self.cell.assign or AssignEntry()
 
     @property
     def operators(self) -> tuple[str, ...]:
-        """Robots that do not hold the part."""
-        return tuple(robot.name for robot in self.cell.robots if robot.name not in self.cell.positioners)
+        """Robots that are available and do not hold the part."""
+        others = {*self.cell.positioners, *self.absent}
+        return tuple(robot.name for robot in self.cell.robots if robot.name not in others)
 
     @property
     def may_move_part(self) -> bool:

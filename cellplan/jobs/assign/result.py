@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from cellplan.files.cell.load import CellFile, load_cell
 from cellplan.files.run.folder import RunFolder
-from cellplan.jobs.assign.assign import Assignment, has_open_rests
+from cellplan.jobs.assign.assign import Assignment, AssignmentBound, has_open_rests
 from cellplan.jobs.layout.result_file import BEST, result_files
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
@@ -23,9 +23,11 @@ from cellplan.report.record.rows import Tables, columns_of, flat
 from cellplan.runs.solution import Run, Solution
 from cellplan.runs.solve import with_verdict
 from cellplan.runs.write_run import versions, write_run
+from cellplan.search.assign.instance import Instance
 from cellplan.search.assign.order import SequencedBlocks
 
 SCHEMA: Final = "cellplan.assignment/1"
+BOUND_SCHEMA: Final = "cellplan.assignment-bound/1"
 HOLDS_FOR: Final = (
     "programs in blocks at the chosen poses of the part, with the modes that were found and the conflicts as listed"
 )
@@ -64,11 +66,11 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
         "blocks": blocks,
         "alternatives": [_alternative(assignment, it) for it in assignment.alternatives],
         "robots": {name: _use(assignment, blocks, waits, name) for name in instance.robots},
-        "only_one_robot": {
-            task: robots[0]
-            for task in instance.tasks
-            if len(robots := sorted({robot for robot, _ in instance.options[task]})) == 1
+        "not_available": {
+            name: {"cycle_with_s": None if cycle is None else number(cycle)}
+            for name, cycle in assignment.with_more.items()
         },
+        "only_one_robot": _only_one_robot(instance),
         "part_moves_s": number(step * _part_steps(assignment)),
         "stations": len({station for station, _ in sequenced.stops}),
         "rounds": assignment.rounds,
@@ -77,6 +79,52 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
         "inputs": dict(assignment.draft.inputs),
         "versions": versions(),
     }
+
+
+def bound_record(bound: AssignmentBound) -> dict[str, Any]:
+    """The bound of an assignment without a program: content of ``assign.json``."""
+    instance, answer = bound.instance, bound.answer
+    is_open = has_open_rests(bound.draft, instance)
+    steps = None if is_open else answer.bound
+    return {
+        "schema": BOUND_SCHEMA,
+        "cell": bound.draft.name,
+        "bound_s": None if steps is None else number(steps * instance.step),
+        "bound_holds_for": OPEN_RESTS if is_open else NO_SOLVER if steps is None else HOLDS_FOR,
+        "is_proved": answer.is_proved,
+        "blocks": [] if answer.schedule is None else [list(block) for block in answer.schedule.blocks],
+        "only_one_robot": _only_one_robot(instance),
+        "counts": dict(bound.counts),
+        "inputs": dict(bound.draft.inputs),
+        "versions": versions(),
+    }
+
+
+def bound_lines(record: Record) -> list[str]:
+    """All lines on the terminal."""
+    if record["bound_s"] is None:
+        return [f"{record['cell']}: {record['bound_holds_for']}"]
+    proved = "the block model is solved to its end" if record["is_proved"] else "more --effort may raise it"
+    return [
+        f"{record['cell']}: lower bound {record['bound_s']:g} s, of {record['bound_holds_for']}",
+        f"  {len(record['blocks'])} blocks at {record['counts']['stations']} poses; {proved}; no program was made",
+    ]
+
+
+def write_bound(record: Record, folder: Path) -> None:
+    """Write the record of a bound into a folder, which appears whole or not at all.
+
+    Raises:
+        InputError: The folder cannot be written, or holds something that cellplan did not write.
+    """
+    with RunFolder(folder) as target:
+        target.write_text("assign.json", as_json(record))
+
+
+def _only_one_robot(instance: Instance) -> dict[str, str]:
+    """The robot of each task that one alone can do."""
+    able = {task: sorted({robot for robot, _ in instance.options[task]}) for task in instance.tasks}
+    return {task: robots[0] for task, robots in able.items() if len(robots) == 1}
 
 
 def _holds_for(assignment: Assignment) -> str:
@@ -197,6 +245,9 @@ def assign_lines(record: Record) -> list[str]:
         if use["cycle_without_s"] is not None:
             without = f"without it about {use['cycle_without_s']:g} s"
         lines.append(f"  {name}: {work}; {without}{_wait_words(use['waits_s'])}")
+    for name, it in record["not_available"].items():
+        cycle = it["cycle_with_s"]
+        lines.append(f"  {name}: not available; with it {'no schedule' if cycle is None else f'about {cycle:g} s'}")
     if only:
         lines.append("  done by one robot alone: " + ", ".join(f"{task} ({robot})" for task, robot in only.items()))
     for block in record["blocks"]:

@@ -1,0 +1,202 @@
+"""Search of an assignment: stations, modes and conflicts of a draft, and the best schedules of them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from cellplan.errors import ImpossibleTasksError, NoSolutionError
+from cellplan.jobs.assign.columns import verified_columns
+from cellplan.jobs.assign.draft import AssignmentDraft
+from cellplan.jobs.assign.written import mirrored_goals, written_points
+from cellplan.model.cell.cell import Timing
+from cellplan.model.progress import Progress
+from cellplan.runs.plan.retiming import joint_bounds, transfer_retimer
+from cellplan.scene.scene import Scene
+from cellplan.search.assign.blocks import BlockAnswer, solve_blocks
+from cellplan.search.assign.clearance import AssignmentClearance
+from cellplan.search.assign.durations import with_stand_offs
+from cellplan.search.assign.goals import TaskGoal, task_goals
+from cellplan.search.assign.greedy import greedy_schedule, improved
+from cellplan.search.assign.instance import Instance, find_conflicts, least_transfer, with_rules
+from cellplan.search.assign.moving_blocks import joint_angles, with_columns
+from cellplan.search.assign.order import SequencedBlocks, Sequencer
+from cellplan.search.assign.refined import Refinement
+from cellplan.search.assign.rules import TaskRules, tasks_before
+from cellplan.search.assign.solver import is_installed
+from cellplan.search.assign.stations import choose_stations
+from cellplan.search.assign.table import Key, ModeSearch, ModeTable, TaskMode
+from cellplan.search.assign.transfers import TransferCertifier
+
+EFFORT: Final = (2.0, 5.0, 15.0, 60.0, 240.0)  # of the block model, in units of deterministic time, by --effort
+LOOKED_FOR: Final = ("torch and weld position", "reach", "joint limits", "path", "tool by the part", "collisions")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedBlocks:
+    """A schedule with its modes, and what is known of it."""
+
+    sequenced: SequencedBlocks
+    bound: int | None  # [steps]
+    is_proved: bool
+    greedy: int  # [steps]
+    others: tuple[SequencedBlocks, ...]  # other schedules
+    examined: int
+    refused: int
+
+
+class AssignmentSearch:
+    """The search of one draft."""
+
+    def __init__(self, draft: AssignmentDraft, effort: int, *, most_stations: int | None = None) -> None:
+        """Begin with nothing chosen; most_stations counts instead of that of the draft."""
+        self.draft, self._effort = draft, EFFORT[effort - 1]
+        self._most_stations = most_stations or draft.settings.most_stations
+        self._scene = Scene.from_cell(draft.cell)
+        self.counts: dict[str, int] = {}
+
+    def instance(self, progress: Progress) -> Instance:
+        """Stations, modes and conflicts.
+
+        Raises:
+            NoSolutionError: A task can be done nowhere.
+        """
+        draft, settings = self.draft, self.draft.settings
+        cell, stations = draft.cell, draft.stations()
+        goals = [self._as_given(goal) for goal in task_goals(cell, draft.robots)]
+        clearance = AssignmentClearance(
+            scene=self._scene, home=draft.home, stations=stations, conflict=settings.conflict_mm.si
+        )
+        directed, fits = [*goals, *mirrored_goals(draft, goals)], clearance.tool_fits
+        search = ModeSearch(cell=cell, goals=directed, stations=stations, spins=draft.spins(), tool_fits=fits)
+        table = search.table()
+        certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))
+        self._refinement = Refinement(search=search, clearance=clearance, certifier=certifier)
+        progress("stations", 0.0)
+        rules = TaskRules.of(cell)
+        used, modes = choose_stations(table, goals, clearance, most=self._most_stations, rules=rules)
+        columns = verified_columns(draft, goals, self._scene, progress) if settings.groups else []
+        able = {it.task for column in columns for it in column.modes} | {task for task, _, _ in modes}
+        refuse_impossible_tasks(draft, goals, table, able)
+        progress("conflicts", 0.0)
+        joints, bounds = {it.name: cell.columns(it.name) for it in cell.robots}, transfer_retimer(self._scene).bounds
+        instance = Instance(
+            goals={goal.name: self._timed(goal, modes) for goal in goals},
+            robots=draft.operators,
+            modes=modes,
+            stations=stations,
+            used=used,
+            conflicts=find_conflicts(modes, clearance),
+            homes={name: draft.home[at] for name, at in joints.items()},
+            bounds={name: bounds.of(at) for name, at in joints.items()},
+            step=cell.motion.step,
+        )
+        instance = with_rules(with_columns(instance, columns), rules)
+        self.counts = {
+            "tasks": len(goals),
+            "poses": len(stations.q),
+            "modes": sum(map(len, table.modes.values())),
+            "stations": len(used),
+            "free_modes": sum(map(len, modes.values())),
+            "conflicts": len(instance.conflicts),
+        } | ({"moving_blocks": len(columns)} if settings.groups else {})
+        return instance
+
+    def planned(self, instance: Instance, *, is_refined: bool) -> PlannedBlocks:
+        """The best schedule of an instance, with certified transfers."""
+        certifier, least = self._refinement.certifier, least_transfer(instance)
+        sequencer = Sequencer(instance, refusals=certifier.refused)
+        greedy = greedy_schedule(instance)
+        nearest = sequencer.sequenced(greedy).steps
+        exchanged = sequencer.ordered(improved(instance, greedy)).schedule
+        answer = BlockAnswer(schedule=None, bound=None, is_proved=False)
+        if is_installed():
+            answer = solve_blocks(instance, least=least, effort=self._effort, hint=exchanged)
+        schedules = [exchanged] if answer.schedule is None else [exchanged, answer.schedule]
+        certified = sorted((certifier.best(sequencer, it) for it in schedules), key=lambda it: it.steps)
+        best, refined = certified[0], instance
+        if is_refined:
+            best, refined = self._refinement.shortened(best, sequencer)
+        bound = answer.bound
+        if bound is not None and (shorter := least_transfer(refined)) < least:
+            bound = solve_blocks(refined, least=shorter, effort=self._effort, hint=best.schedule).bound
+        return PlannedBlocks(
+            sequenced=best,
+            bound=bound,
+            is_proved=answer.is_proved,
+            greedy=nearest,
+            others=(*certified[1:], *map(sequencer.ordered, answer.others)),
+            examined=certifier.examined,
+            refused=len(sequencer.refusals),
+        )
+
+    def blocks(self, instance: Instance) -> BlockAnswer:
+        """What the block model comes to by itself."""
+        schedule = improved(instance, greedy_schedule(instance))
+        if not is_installed():
+            return BlockAnswer(schedule=schedule, bound=None, is_proved=False)
+        return solve_blocks(instance, least=least_transfer(instance), effort=self._effort, hint=schedule)
+
+    def without(self, instance: Instance, robot: str) -> float | None:
+        """Cycle in [s] by the model if a robot did no task; None where a task is its alone."""
+        others = instance.without(robot)
+        return self.cycle(others) if others.tasks == instance.tasks else None
+
+    def cycle(self, instance: Instance) -> float | None:
+        """Cycle in [s] by the model with little effort, transfers certified; None where no schedule keeps all rules."""
+        try:
+            schedule = improved(instance, greedy_schedule(instance))
+        except NoSolutionError:
+            return None
+        if is_installed():
+            least = least_transfer(instance)
+            schedule = solve_blocks(instance, least=least, effort=EFFORT[0], hint=schedule).schedule or schedule
+        certifier = self._refinement.certifier
+        sequencer = Sequencer(instance, refusals=certifier.refused)
+        return certifier.settle(sequencer, sequencer.ordered(schedule).schedule).steps * instance.step
+
+    def _timed(self, goal: TaskGoal, modes: Mapping[Key, Sequence[TaskMode]]) -> TaskGoal:
+        """The goal with the time that it takes at least where its program is retimed."""
+        cell = self.draft.cell
+        if cell.motion.timing is Timing.AS_WRITTEN:
+            return goal
+        limits = {robot.name: joint_bounds(cell).of(cell.columns(robot.name)) for robot in cell.robots}
+        return with_stand_offs(goal, modes, limits, cell.motion.step)
+
+    def _as_given(self, goal: TaskGoal) -> TaskGoal:
+        """The goal with what its task states, and with what is not free: direction, spin, station and start."""
+        cell, free = self.draft.cell, self.draft.settings.free
+        task, holder = cell.task(goal.name), cell.positioners[:1]
+        station = task.holder_posture
+        if station is None and holder and "station" not in free:
+            station = self.draft.holder_start
+        is_free = "direction" in free and task.start_posture is None and written_points(cell, goal.name) is not None
+        return replace(
+            goal,
+            after=tasks_before(cell)[goal.name],
+            is_reversible=goal.is_reversible and is_free,
+            holder_q=station,
+            start_q=task.start_posture,
+            is_spin_free=f"tasks.{goal.name}.spin_deg" not in cell.origin.lines,
+        )
+
+
+def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table: ModeTable, able: set[str]) -> None:
+    """Refuse tasks that no robot can do at any pose of the part, each with the filter that dropped it.
+
+    Raises:
+        ImpossibleTasksError: One line for each of them.
+    """
+    lines = []
+    for goal in goals:
+        if goal.name not in able:
+            counts: Mapping[str, int] = table.counts.get(goal.name, {})
+            dropped = next((name for name in LOOKED_FOR if not counts.get(name)), LOOKED_FOR[-1])
+            names = ", ".join(goal.robots)
+            turns = draft.may_move_part and not draft.settings.groups and joint_angles(draft.cell, goal) is not None
+            cure = "write assign.groups: true, so that the part turns meanwhile, or " if turns else ""
+            lines.append(
+                f"{draft.cell.task(goal.name).where()}: none of {names} can do it at any pose of the part: nothing is "
+                f"left after the filter '{dropped}'; {cure}give more poses of the part, other robots or bases"
+            )
+    if lines:
+        raise ImpossibleTasksError(lines, [goal.name for goal in goals if goal.name not in able])
