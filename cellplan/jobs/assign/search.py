@@ -19,7 +19,7 @@ from cellplan.search.assign.goals import TaskGoal, task_goals
 from cellplan.search.assign.greedy import greedy_schedule, improved
 from cellplan.search.assign.instance import Instance, find_conflicts, least_transfer, with_rules
 from cellplan.search.assign.moving_blocks import joint_angles, with_columns
-from cellplan.search.assign.order import SequencedBlocks, Sequencer
+from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer
 from cellplan.search.assign.refined import Refinement
 from cellplan.search.assign.rules import TaskRules, tasks_before
 from cellplan.search.assign.solver import is_installed
@@ -52,6 +52,7 @@ class AssignmentSearch:
         self.draft, self._effort = draft, EFFORT[effort - 1]
         self._most_stations = most_stations or draft.settings.most_stations
         self._scene = Scene.from_cell(draft.cell)
+        self._refusals: list[Refusal] = []  # of transfers, once for all schedules
         self.counts: dict[str, int] = {}
 
     def instance(self, progress: Progress) -> Instance:
@@ -104,7 +105,7 @@ class AssignmentSearch:
     def planned(self, instance: Instance, *, is_refined: bool) -> PlannedBlocks:
         """The best schedule of an instance, with certified transfers."""
         certifier, least = self._refinement.certifier, least_transfer(instance)
-        sequencer = Sequencer(instance, refusals=certifier.refused)
+        sequencer = Sequencer(instance, refusals=self._refusals)
         greedy = greedy_schedule(instance)
         nearest = sequencer.sequenced(greedy).steps
         exchanged = sequencer.ordered(improved(instance, greedy)).schedule
@@ -150,9 +151,9 @@ class AssignmentSearch:
         if is_installed():
             least = least_transfer(instance)
             schedule = solve_blocks(instance, least=least, effort=EFFORT[0], hint=schedule).schedule or schedule
-        certifier = self._refinement.certifier
-        sequencer = Sequencer(instance, refusals=certifier.refused)
-        return certifier.settle(sequencer, sequencer.ordered(schedule).schedule).steps * instance.step
+        sequencer = Sequencer(instance, refusals=self._refusals)
+        settled = self._refinement.certifier.settle(sequencer, sequencer.ordered(schedule).schedule)
+        return settled.steps * instance.step
 
     def _timed(self, goal: TaskGoal, modes: Mapping[Key, Sequence[TaskMode]]) -> TaskGoal:
         """The goal with the time that it takes at least where its program is retimed."""

@@ -47,11 +47,6 @@ class TransferCertifier:
         self.scene = scene_of_run(self.scene, ())
         self._moves = StraightMoves(self.scene)
 
-    @property
-    def refused(self) -> list[Refusal]:
-        """Transfers that are known not to be free straight."""
-        return [refusal for refusal in self._known.values() if refusal is not None]
-
     def settle(
         self, sequencer: Sequencer, schedule: BlockSchedule, *, below: SequencedBlocks | None = None
     ) -> SequencedBlocks:
