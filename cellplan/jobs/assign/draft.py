@@ -19,7 +19,8 @@ from cellplan.model.robot.robot import configuration_in_si, start_keys
 from cellplan.model.settings.assign import POSTURE_LIMIT, AssignEntry
 from cellplan.runs.plan.program_faults import refuse_crowded_homes
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.goals import Stations
+from cellplan.search.assign.goals import Stations, task_goals
+from cellplan.search.assign.reach import places_in_reach
 from cellplan.search.assign.table import BranchFollower
 
 POSE_KEYS = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")  # of the part in the world
@@ -125,7 +126,7 @@ class AssignmentDraft:
         if written is None or not is_free:
             compared = self.holder_start[None]
         elif isinstance(written, Mapping) and set(written) & set(POSE_KEYS) - set(start_keys(holder.model)):
-            compared = _at_poses(self.cell, holder, written, where)
+            compared = _at_poses(self, holder, written, where)
         elif isinstance(written, Mapping):
             compared = _grid(holder, written, where)
         else:
@@ -228,19 +229,27 @@ def _grid(holder: Robot, ranges: Mapping[str, Sequence[float]], where: str) -> A
     return configurations[inside]
 
 
-def _at_poses(cell: Cell, holder: Robot, ranges: Mapping[str, Sequence[float]], where: str) -> Array:
-    """Configurations that bring the part to the poses of a grid, the nearest to the start, in [rad] or [m], (K, n)."""
-    X_PT, start = cell.part.held_by[0].X_PT, _start(holder)
+def _at_poses(draft: AssignmentDraft, holder: Robot, ranges: Mapping[str, Sequence[float]], where: str) -> Array:
+    """Configurations that bring the part to the poses of a grid, the nearest to the start, in [rad] or [m], (K, n).
+
+    Where no coordinate is given, each orientation has the place in the common reach where most can be done.
+    """
+    cell, start = draft.cell, _start(holder)
     written = _spanned(ranges, POSE_KEYS, "a coordinate or an angle of the part", where)
     X_WP = Stations.of(cell, start[None]).X_WP[0]
     given = {key: [1e3 * float(it)] for key, it in zip(POSE_KEYS, X_WP[:3, 3], strict=False)}
     values = product(*(written.get(key, given.get(key, [0.0])) for key in POSE_KEYS))
     X_WP_grid = np.array([pose(np.array(it[:3]) / 1e3, np.radians(it[3:])) for it in values])
-    reached = BranchFollower.of(holder).follow((X_WP_grid @ X_PT)[:, None])
+    tries = X_WP_grid[:, None]  # shape (K, places, 4, 4), the best place first
+    if not set(written) & set(given):
+        goals, most = task_goals(cell, draft.robots), max(1, POSTURE_LIMIT // len(X_WP_grid))
+        tries = np.repeat(tries, most, axis=1)
+        tries[:, :, :3, 3] = places_in_reach(cell, goals, X_WP_grid, most=most)
+    reached = BranchFollower.of(holder).follow((tries.reshape(-1, 4, 4) @ cell.part.held_by[0].X_PT)[:, None])
     far = np.abs(reached.q[:, 0] - start).max(axis=1, initial=0.0)
     nearest: dict[int, int] = {}
-    for index in np.argsort(far, kind="stable").tolist():
-        nearest.setdefault(int(reached.rows[index]), index)
+    for index in np.lexsort((far, reached.rows)).tolist():
+        nearest.setdefault(int(reached.rows[index]) // tries.shape[1], index)
     if not nearest:
         raise InputError(
             f"{where}: expected a pose of the part to which '{holder.name}' can bring it within its joint limits, got "

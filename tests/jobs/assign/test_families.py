@@ -19,6 +19,7 @@ from cellplan.jobs.assign.written import mirrored_goals
 from cellplan.runs.solve import solve
 from cellplan.search.assign.goals import task_goals
 from cellplan.search.assign.schedule import refuse_impossible
+from cellplan.search.assign.table import BranchFollower
 
 SCRIPT = Path(__file__).resolve().parents[3] / "benchmarks" / "assign.py"
 ROUNDING = 1e-6  # [m, rad] errors that configurations are searched down to
@@ -54,14 +55,33 @@ def test_an_arm_brings_the_part_to_the_poses_of_the_grid(tmp_path: Path, cells: 
 
 def test_a_place_without_a_key_is_the_one_at_the_start_of_the_holder(tmp_path: Path, cells: ModuleType) -> None:
     values = cells.generated_cell(8, 2, 0, "arm")
-    values["assign"]["stations"] = {"pitch_deg": [60, 90, 30]}
+    values["assign"]["stations"] = {"x_mm": [0, 0, 1], "pitch_deg": [60, 90, 30]}
 
     stations = draft(tmp_path, values).stations()
 
     values["assign"]["stations"] = [list(values["robots"]["arm"]["start_deg"])]
     at_start = draft(tmp_path, values).stations()
     assert len(stations.q) == 2
-    assert np.abs(stations.X_WP[:, :3, 3] - at_start.X_WP[:, :3, 3]).max() < ROUNDING
+    assert np.abs(stations.X_WP[:, 1:3, 3] - at_start.X_WP[:, 1:3, 3]).max() < ROUNDING
+    assert np.abs(stations.X_WP[:, 0, 3]).max() < ROUNDING
+
+
+def test_without_coordinates_the_part_comes_where_the_others_reach_it(tmp_path: Path, cells: ModuleType) -> None:
+    """From a start that is turned away from them; the orientations are those of the grid."""
+    values = cells.generated_cell(8, 2, 0, "arm")
+    values["assign"]["stations"] = {"roll_deg": [-30, 30, 30]}
+    values["robots"]["arm"] |= {key: [150, -90, 90, 0, 0, 0] for key in ("start_deg", "home_deg")}
+    given = draft(tmp_path, values)
+
+    stations = given.stations()
+
+    goals = task_goals(given.cell, given.robots)
+    grid = np.array([pose(np.zeros(3), np.radians([roll, 0, 0])) for roll in (-30, 0, 30)])
+    assert np.abs(np.sort(stations.X_WP[:, 2, 1]) - np.sort(grid[:, 2, 1])).max() < ROUNDING
+    follower = [BranchFollower.of(given.cell.robot(name)) for name in given.operators]
+    for X_WP in stations.X_WP:
+        tools = np.array([X_WP @ goal.X_PT[len(goal.X_PT) // 2] for goal in goals])
+        assert all(it.follow(tools[:, None]).reaches.mean() > 0.5 for it in follower)
 
 
 @pytest.mark.parametrize(

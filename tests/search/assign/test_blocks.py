@@ -149,6 +149,23 @@ def test_exchanges_keep_columns_whole(seed: int) -> None:
     assert all(robot != "a" for keys in instance.without("a").columns.values() for _, robot, _ in keys)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(4, 154, 15))
+def test_one_hundred_and_fifty_more_are_as_good_as_enumeration(first: int) -> None:
+    """Four tasks at two or three stations, some in a given order; every fifteenth has five."""
+    pytest.importorskip("ortools")
+    for seed in range(first, first + 15):
+        count = 5 if seed == first else 4
+        instance = small_instance(seed, count, stations=2 + (seed % 2) * (count == 4), chained=seed % 4 == 3)
+
+        answer = solve_blocks(instance, least=LEAST, effort=10.0)
+
+        assert answer.schedule is not None
+        refuse_impossible(instance, answer.schedule)
+        assert answer.is_proved
+        assert answer.bound == model_cycle(instance, answer.schedule) == best_by_enumeration(instance)
+
+
 def lags(*pairs: tuple[str, str], steps: int) -> dict[tuple[str, str], int]:
     """Rests of the part, longer in one direction."""
     return {(a, b): steps + 7 * (a > b) for pair in pairs for a, b in (pair, pair[::-1])}
