@@ -38,7 +38,7 @@ def test_no_place_has_more_tasks_in_reach(given: AssignmentDraft) -> None:
 
     assert places.shape == (3, PLACES, 3)
     middle = np.mean([it.centre for it in reach.values()], axis=0)
-    every = [middle + [x, y, z] for x in AROUND for y in AROUND for z in AROUND]
+    every = [middle + np.array([x, y, z]) for x in AROUND for y in AROUND for z in AROUND]
     for X, best in zip(poses, places, strict=True):
 
         def tasks_within(place: Array, X: Array = X) -> int:
