@@ -32,7 +32,7 @@ BASES: Final = {
     "north": [0, 1350, -90],
     "south": [0, -1450, 90],
 }  # x and y in [mm], yaw in [deg]
-BESIDE: Final = [1350, 1150, 180]  # likewise of the arm in the north of a rail, which ends where it would stand
+NORTH_OF_RAIL: Final = [1350, 1150, 180]  # likewise of the arm in the north of a rail, which ends where it would stand
 NEARER: Final = {"table": 1.0, "arm": 0.85, "rail": 0.78, "fixed": 0.78}  # [-] share of these distances
 TORCH: Final = {
     "length_mm": 260,
@@ -124,7 +124,7 @@ def generated_cell(seams: int, arms: int, seed: int, kind: str = "table") -> dic
     robots, held, stations = carriage(kind)
     names = [name for name in BASES if (kind, name) != ("arm", "west")]
     for name in names[:arms]:
-        x, y, yaw = BESIDE if (kind, name) == ("rail", "north") else BASES[name]
+        x, y, yaw = NORTH_OF_RAIL if (kind, name) == ("rail", "north") else BASES[name]
         robots[name] = {
             "model": "kuka_kr6",
             "base": {"xyz_mm": [NEARER[kind] * x, NEARER[kind] * y, 500], "rpy_deg": [0, 0, yaw]},

@@ -17,7 +17,7 @@ from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.search.assign.goals import Stations, TaskGoal
 
 AROUND: Final = np.linspace(-0.6, 0.6, 7)  # [m] from the middle of the operators' reach, along each axis
-DRAWN: Final = 2000  # configurations that tell the reach of an operator
+SAMPLES: Final = 2000  # configurations that tell the reach of an operator
 MOSTLY: Final = (0.1, 0.9)  # [-] quantiles of the distances of its tool tip
 
 
@@ -32,8 +32,8 @@ class Reach:
     @classmethod
     def of(cls, robot: Robot) -> Self:
         """The reach of a robot, by configurations drawn within its joint limits."""
-        drawn = random_configurations(robot.model, DRAWN, generator(f"reach of {robot.name}"))
-        tips = ScrewChain(robot).tool_poses(drawn)[:, :3, 3]
+        configurations = random_configurations(robot.model, SAMPLES, generator(f"reach of {robot.name}"))
+        tips = ScrewChain(robot).tool_poses(configurations)[:, :3, 3]
         centre = tips.mean(axis=0)
         nearest, farthest = np.quantile(np.linalg.norm(tips - centre, axis=1), MOSTLY).tolist()
         return cls(centre=centre, nearest=nearest, farthest=farthest)
