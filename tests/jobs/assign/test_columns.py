@@ -77,6 +77,7 @@ def test_the_written_program_solves_to_the_same_run(drum: Assignment, tmp_path: 
 
     text = (tmp_path / "out" / "best.yaml").read_text()
     assert text.count("holder_moves: true") == 2
+    assert "during them, but for blocks in which it carries" in (tmp_path / "again" / "report.html").read_text()
     for robot in ("table", "north", "south"):
         tables = [tmp_path / it / "tables" / f"{robot}.csv" for it in ("again", "out/run")]
         assert tables[0].read_bytes() == tables[1].read_bytes()
