@@ -15,7 +15,7 @@ from cellplan.checks.clearance.tool_depth import check_depths
 from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
 from cellplan.checks.joints.demanded_feeds import check_feeds
 from cellplan.checks.joints.drift import check_joint_drift, repeatability
-from cellplan.checks.joints.limits import check_joints, check_shown
+from cellplan.checks.joints.limits import check_joints, check_shown, check_sums
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.joints.payload import check_payload, load_uses
 from cellplan.checks.joints.transfer_speeds import check_transfer_speeds
@@ -216,6 +216,7 @@ def _joints(cell: Cell, times: Array, q: Mapping[str, Array]) -> tuple[list[Join
         robot_uses = joint_uses(robot, times, q[robot.name])
         uses += robot_uses
         checks += [*check_joints(robot_uses, times, q[robot.name]), *check_shown(robot, times, q[robot.name])]
+        checks += check_sums(robot, times, q[robot.name])
     return uses, checks
 
 

@@ -22,6 +22,37 @@ def check_joints(uses: tuple[JointUse, ...], times: Array, q: Array) -> list[Che
     return checks
 
 
+def check_sums(robot: Robot, times: Array, q: Array) -> list[Check]:
+    """Sums of joint angles against their ranges; between two rows they are linear as the angles.
+
+    Args:
+        times: Times in [s], shape (N,).
+        q: Positions in [rad] or [m], shape (N, n).
+    """
+    checks = []
+    for it in robot.joint_sums:
+        total, names = it.of(q), " + ".join(it.joints)
+        worst = int(np.argmin(np.minimum(total - it.lower, it.upper - total)))
+        value, at_s, passed = float(total[worst]), float(times[worst]), bool(np.all(it.holds(q)))
+        limit = it.lower if value - it.lower < it.upper - value else it.upper
+        verdict = "stays within" if passed else "leaves"
+        low, high = np.degrees([it.lower, it.upper])
+        words = f"{verdict} {low:.6g} .. {high:.6g} deg, {np.degrees(value):.4f} deg at worst, at {at_s:.3f} s"
+        checks.append(
+            Check(
+                name="joint_sum",
+                subject=f"{robot.name}/{names}",
+                passed=passed,
+                value=float(np.degrees(value)),
+                limit=float(np.degrees(limit)),
+                unit="deg",
+                at_s=at_s,
+                message=f"sum {names} of {robot.name} {words}",
+            )
+        )
+    return checks
+
+
 def check_shown(robot: Robot, times: Array, q: Array) -> list[Check]:
     """Positions that a controller shows, against the controller's limits, which may be on coupled axes.
 

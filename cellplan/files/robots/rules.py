@@ -44,6 +44,11 @@ def robot_findings(name: str, entry: RobotEntry, model: RobotModel, document: Ya
     yield from _unit_findings(("robots", name), entry, model, document)
     turning = tuple(joint.name for joint in model.joints if joint.is_revolute)
     yield from payload_findings(("robots", name, "payload"), entry.payload, turning, document)
+    for number, names in enumerate(it.joints for it in entry.joint_sums):
+        for index, joint in enumerate(names):
+            if joint not in turning:
+                place = (*path, "joint_sums", number, "joints", index)
+                yield document.finding(place, unknown_name("a revolute joint of this robot", joint, turning))
     count = len(model.joints)
     if entry.weights is not None and len(entry.weights) != count:
         text = f"expected {count} weights, one per joint ({listed(model.joint_names)}), got {len(entry.weights)}"

@@ -21,6 +21,7 @@ from cellplan.model.settings.entry import (
     SlidingSpeed,
     Text,
     by_kind,
+    require_unique,
     rule,
 )
 from cellplan.model.settings.robot import FARTHEST, BodyAccuracyEntry, JointPosition, PayloadEntry
@@ -90,6 +91,24 @@ LockedPosition = Annotated[
     Annotated[Literal["zero"], Tag(f"<{LOCK_WORDS}>")] | Annotated[JointPosition, Tag("<number>")],
     by_kind(LOCK_WORDS, number=(int, float)),
 ]
+
+
+class JointSumEntry(Entry):
+    """A range of a sum of joint angles, which a dress pack bears."""
+
+    joints: Annotated[tuple[Text, ...], Field(min_length=2, max_length=AXIS_LIMIT)] = Field(
+        description="Revolute joints whose angles are added."
+    )
+    range_deg: tuple[Angle, Angle] = Field(description="Least and largest sum.")
+
+    @model_validator(mode="after")
+    def _is_range(self) -> Self:
+        """The smaller angle comes first, and each joint once."""
+        low, high = self.range_deg
+        if not low < high:
+            raise rule(f"expected [low, high], got [{low:g}, {high:g}]: the smaller angle comes first", "range_deg")
+        require_unique(self.joints, "joints")
+        return self
 
 
 class IntervalEntry(Entry):
@@ -274,6 +293,11 @@ class RobotEntry(Entry):
         default=True,
         description="Whether it can work. One that cannot stands at its home, and its tasks are open to the others: "
         "`cellplan assign` gives them away.",
+    )
+    joint_sums: tuple[JointSumEntry, ...] = Field(
+        default=(),
+        max_length=AXIS_LIMIT,
+        description="Ranges of sums of joint angles, such as a dress pack bears; checked at every row.",
     )
     service: ServiceEntry | None = Field(
         default=None,

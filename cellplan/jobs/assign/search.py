@@ -28,7 +28,15 @@ from cellplan.search.assign.table import Key, ModeSearch, ModeTable, TaskMode
 from cellplan.search.assign.transfers import TransferCertifier
 
 EFFORT: Final = (2.0, 5.0, 15.0, 60.0, 240.0)  # of the block model, in units of deterministic time, by --effort
-LOOKED_FOR: Final = ("torch and weld position", "reach", "joint limits", "path", "tool by the part", "collisions")
+LOOKED_FOR: Final = (
+    "torch and weld position",
+    "reach",
+    "joint limits",
+    "path",
+    "sums of joints",
+    "tool by the part",
+    "collisions",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,6 +17,7 @@ from cellplan.model.cell.mounting import Mount
 from cellplan.model.cell.rod import Rod
 from cellplan.model.origin import Origin
 from cellplan.model.presented import Presented
+from cellplan.model.robot.joint_sum import JointSum
 from cellplan.model.robot.robot import Body, JointLimits, RobotModel
 from cellplan.model.settings.assign import AssignEntry
 from cellplan.model.settings.checks import ChecksEntry
@@ -81,6 +82,7 @@ class Robot:
         path: Its joints over the whole clock; None where they follow from the tasks.
         control: Where it is connected; None when no controller is stated.
         service: How its tool is cleaned; None when it is not.
+        joint_sums: Ranges of sums of its joint angles.
     """
 
     name: str
@@ -99,6 +101,7 @@ class Robot:
     path: JointSpline | None = None
     control: RobotControlEntry | None = None
     service: Service | None = None
+    joint_sums: tuple[JointSum, ...] = ()
 
     @property
     def bodies_at_work(self) -> tuple[Body, ...]:

@@ -89,6 +89,7 @@ _LISTED: Final = (  # the gravest first
     CheckKind("stop_depth", "tool depth in the part within its limit where a robot stops", "Tool too deep in the part where a robot stops"),
     CheckKind("joint_position", "joint positions within their limits", "Joint beyond its limit", group="joint limits", excess=DISTANCE, concern=LIMIT),
     CheckKind("controller_position", "positions that controllers show within their limits", "Shown position beyond its limit", group="joint limits", excess=DISTANCE, concern=LIMIT),
+    CheckKind("joint_sum", "sums of joint angles within their ranges", "Sum of joint angles beyond its range", excess=DISTANCE),
     CheckKind("joint_margin", "joints keep the demanded margin", "Joint too near its limit", excess=DISTANCE, concern=LIMIT),
     CheckKind("via_point", "via points passed", "Via point missed"),
     CheckKind("service", "tools cleaned in time and long enough", "Tool cleaned too late or too shortly"),

@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.checks.joints.acceleration_limits import check_accelerations, joint_peaks
 from cellplan.checks.joints.demanded_feeds import check_feeds
-from cellplan.checks.joints.limits import check_joints, check_shown
+from cellplan.checks.joints.limits import check_joints, check_shown, check_sums
 from cellplan.checks.joints.payload import check_payload, load_uses
 from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
 from cellplan.geometry.arrays import Array
@@ -41,7 +41,9 @@ def position_findings(played: ExecutedProgram) -> Iterator[str]:
             times = times + np.tile([0.0, 1e-6], len(low))
         uses = joint_uses(robot, times, q)
         checks = [check for check in check_joints(uses, times, q) if check.name == POSITION]
-        yield from _failed([*checks, *check_shown(robot, times_of(rows), rows.q)], played.phase_at)
+        for check_rows in (check_shown, check_sums):
+            checks += check_rows(robot, times_of(rows), rows.q)
+        yield from _failed(checks, played.phase_at)
 
 
 def joint_findings(played: ExecutedProgram, *, accelerations: bool) -> Iterator[str]:

@@ -120,7 +120,9 @@ class ModeSearch:
         if goal.start_q is not None:
             is_given = np.abs(result.q[:, 0] - goal.start_q).max(axis=1) < NEAR_START
         table.note("path", [goal.name] * int(is_given.sum()))
-        for index in np.flatnonzero(is_given).tolist():
+        bears = np.all([is_given, *(it.holds(result.q).all(axis=1) for it in follower.robot.joint_sums)], axis=0)
+        table.note("sums of joints", [goal.name] * int(bears.sum()))
+        for index in np.flatnonzero(bears).tolist():
             row = int(result.rows[index])
             place, spin = int(places[row // len(spins)]), float(spins[row % len(spins)])
             mode = TaskMode(

@@ -16,7 +16,7 @@ from cellplan.files.schema import CellDocument
 from cellplan.files.schema.cell import CycleEntry, MotionEntry
 from cellplan.files.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
 from cellplan.files.schema.path import PathEntry, PolylineEntry
-from cellplan.files.schema.robot import RobotEntry, ServiceEntry
+from cellplan.files.schema.robot import JointSumEntry, RobotEntry, ServiceEntry
 from cellplan.files.schema.shapes import ObstacleEntry
 from cellplan.files.schema.task import BlendEntry, CornerChoice, TaskEntry, TrapezoidEntry, ViaEntry
 from cellplan.files.schema.tool import OF_ROD, RodEntry, ToolEntry
@@ -25,6 +25,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Grasp, Mode, MotionSettings, Obstacle, Part, Robot, Timing, Tool
 from cellplan.model.cell.rod import Holder, Rod, tool_body_name
 from cellplan.model.origin import Origin
+from cellplan.model.robot.joint_sum import JointSum
 from cellplan.model.robot.robot import BASE, Body, RobotModel, configuration_in_si
 from cellplan.model.settings.units import Mm, in_si, si_or_none
 from cellplan.model.task.task import (
@@ -80,7 +81,16 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         order=_order(name, document),
         control=entry.controller,
         service=_service(entry.service, model),
+        joint_sums=tuple(_joint_sum(it, model) for it in entry.joint_sums),
     )
+
+
+def _joint_sum(entry: JointSumEntry, model: RobotModel) -> JointSum:
+    """A range of a sum of joint angles."""
+    names = [joint.name for joint in model.joints]
+    low, high = entry.range_deg
+    columns = tuple(names.index(name) for name in entry.joints)
+    return JointSum(joints=entry.joints, columns=columns, lower=low.si, upper=high.si)
 
 
 def _service(entry: ServiceEntry | None, model: RobotModel) -> Service | None:
