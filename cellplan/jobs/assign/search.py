@@ -28,6 +28,8 @@ from cellplan.search.assign.table import Key, ModeSearch, ModeTable, TaskMode
 from cellplan.search.assign.transfers import TransferCertifier
 
 EFFORT: Final = (2.0, 5.0, 15.0, 60.0, 240.0)  # of the block model, in units of deterministic time, by --effort
+LITTLE: Final = 1.0  # likewise, of what is told beside the program
+MANY: Final = 25  # tasks; more of them get more work, by the square of their number
 LOOKED_FOR: Final = (
     "torch and weld position",
     "reach",
@@ -57,7 +59,7 @@ class AssignmentSearch:
 
     def __init__(self, draft: AssignmentDraft, effort: int, *, most_stations: int | None = None) -> None:
         """Begin with nothing chosen; most_stations counts instead of that of the draft."""
-        self.draft, self._effort = draft, EFFORT[effort - 1]
+        self.draft, self._effort = draft, EFFORT[effort - 1] * max(1.0, len(draft.cell.tasks) / MANY) ** 2
         self._most_stations = most_stations or draft.settings.most_stations
         self._scene = Scene.from_cell(draft.cell)
         self._refusals: list[Refusal] = []  # of transfers, once for all schedules
@@ -158,7 +160,7 @@ class AssignmentSearch:
             return None
         if is_installed():
             least = least_transfer(instance)
-            schedule = solve_blocks(instance, least=least, effort=EFFORT[0], hint=schedule).schedule or schedule
+            schedule = solve_blocks(instance, least=least, effort=LITTLE, hint=schedule).schedule or schedule
         sequencer = Sequencer(instance, refusals=self._refusals)
         settled = self._refinement.certifier.settle(sequencer, sequencer.ordered(schedule).schedule)
         return settled.steps * instance.step
