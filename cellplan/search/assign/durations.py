@@ -27,11 +27,11 @@ def with_stand_offs(
         step: Time between two rows in [s].
     """
     of_task = (mode for key, choices in modes.items() if key[0] == goal.name for mode in choices)
-    least = min((_stand_off_steps(mode, bounds[mode.robot], step) for mode in of_task), default=0)
-    return replace(goal, steps=goal.steps + least)
+    least = min((stand_off_steps(mode, bounds[mode.robot], step) for mode in of_task), default=0)
+    return replace(goal, steps=goal.steps + least, stand_off_steps=least)
 
 
-def _stand_off_steps(mode: TaskMode, limits: JointLimitsInTime, step: float) -> int:
+def stand_off_steps(mode: TaskMode, limits: JointLimitsInTime, step: float) -> int:
     """Steps of both ends of a mode, each joint by itself, without those that rounding up and a limit of jerk add."""
     ends: Array = mode.q[[1, -1]] - mode.q[[0, -2]]
     alone = ends[:, :, None] * np.eye(ends.shape[1])

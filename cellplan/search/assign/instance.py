@@ -12,6 +12,7 @@ from cellplan.geometry.arrays import Array, Indices
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.search.assign.clearance import AssignmentClearance
+from cellplan.search.assign.durations import stand_off_steps
 from cellplan.search.assign.goals import Stations, TaskGoal
 from cellplan.search.assign.rules import TaskRules
 from cellplan.search.assign.table import Key, TaskMode
@@ -106,6 +107,13 @@ class Instance:
     def steps(self, task: str) -> int:
         """Whole steps of a task."""
         return self.goals[task].steps
+
+    def late_steps(self, end: End | None) -> int:
+        """Steps of a retimed task beyond the least, as its mode is slow in approach and retraction."""
+        least = None if end is None or end.mode.task not in self.goals else self.goals[end.mode.task].stand_off_steps
+        if end is None or least is None:
+            return 0
+        return max(0, stand_off_steps(end.mode, self.bounds[end.mode.robot], self.step) - least)
 
     def ends(self, task: str, robot: str, station: int) -> list[End]:
         """All modes in all directions."""

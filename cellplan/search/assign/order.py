@@ -6,7 +6,7 @@ takes as long as its slowest robot, or the part. Transfers that are not free str
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import combinations, pairwise, permutations, product
 from typing import Final, Self
 
@@ -44,7 +44,7 @@ class Layer:
     ends: list[list[End | None]]  # by operator; None at home
     leaving: list[Array]  # configurations in which each one leaves the block, shape (K, n) each
     coming: list[Array]  # and comes to it
-    crowding: Indices  # steps that keep joint choices out in which two arcs come too near, an axis for each operator
+    longer: Indices  # steps by which the block is longer with joint choices, an axis for each operator
 
     @classmethod
     def of(cls, instance: Instance, station: int | None, at_work: Mapping[str, str]) -> Self:
@@ -59,7 +59,7 @@ class Layer:
             ends.append([*modes] or [None])
             leaving.append(np.array([end.end for end in modes] or [instance.homes[robot]]))
             coming.append(np.array([end.begin for end in modes] or [instance.homes[robot]]))
-        return cls(station=station, ends=ends, leaving=leaving, coming=coming, crowding=crowding(instance, ends))
+        return cls(station=station, ends=ends, leaving=leaving, coming=coming, longer=longer(instance, ends))
 
     def preceding(self, instance: Instance, cleaned: Collection[str]) -> Self:
         """Where the operators stand before the block while tools are cleaned: for that, or ready for their tasks."""
@@ -73,7 +73,7 @@ class Layer:
             for robot, choices in zip(instance.robots, ends, strict=True)
         ]
         none = np.zeros(list(map(len, ends)), dtype=np.int64)
-        return type(self)(station=self.station, ends=ends, leaving=at, coming=at, crowding=none)
+        return type(self)(station=self.station, ends=ends, leaving=at, coming=at, longer=none)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -140,7 +140,7 @@ class Sequencer:
         for before, after in pairwise(layers):
             total = self._transfers(before, after) + np.expand_dims(cost, tuple(range(cost.ndim, 2 * cost.ndim)))
             total = total.reshape(-1, *after.shape)
-            cost = np.min(total, axis=0) + after.crowding
+            cost = np.min(total, axis=0) + after.longer
             back.append(np.argmin(total, axis=0))
             costs.append(cost)
         stops, place, moved = list[Stop](), tuple([0] * len(self.instance.robots)), list[int]()
@@ -269,9 +269,18 @@ def is_preceding(ends: Sequence[End | None]) -> bool:
     return any(end is not None and end.mode.task in (CLEANED, READY) for end in ends)
 
 
-def crowding(instance: Instance, ends: Sequence[Sequence[End | None]]) -> Indices:
-    """Steps that keep joint choices out in which two arcs come too near, shape (K, ...), an axis for each robot."""
-    extra = np.zeros(list(map(len, ends)), dtype=np.int64)
+def longer(instance: Instance, ends: Sequence[Sequence[End | None]]) -> Indices:
+    """Steps by which a block is longer than it is at least, shape (K, ...), an axis for each robot.
+
+    Choices in which approach and retraction are slow lengthen it where it is retimed; those in which two arcs come too
+    near each other beyond any cycle.
+    """
+    least = [0 if it[0] is None else instance.steps(it[0].mode.task) for it in ends]
+    works = [
+        steps + np.array([instance.late_steps(end) for end in choices])
+        for steps, choices in zip(least, ends, strict=True)
+    ]
+    extra: Indices = reduce(np.maximum.outer, works) - max(least)
     for a, b in combinations(range(len(ends)), 2) if instance.rules.crowded else ():
         for (i, first), (k, second) in product(enumerate(ends[a]), enumerate(ends[b])):
             if first is None or second is None:
