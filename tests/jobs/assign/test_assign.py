@@ -131,7 +131,7 @@ def test_the_same_cell_gives_the_same_record(assignment: Assignment) -> None:
 def test_without_the_solver_there_is_a_program_and_no_bound(
     assignment: Assignment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cellplan.jobs.assign.assign.is_installed", lambda: False)
+    monkeypatch.setattr("cellplan.jobs.assign.search.is_installed", lambda: False)
 
     alone = assign(AssignmentDraft.load(OPEN))
 
