@@ -6,11 +6,11 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.planning.timing.retime import JointLimitsInTime
-from cellplan.search.assign.goals import Stations, TaskGoal
-from cellplan.search.assign.instance import Instance, with_rules
-from cellplan.search.assign.moving_blocks import Column, with_columns
-from cellplan.search.assign.rules import TaskRules
-from cellplan.search.assign.table import TaskMode
+from cellplan.search.assign.problem.goals import Stations, TaskGoal
+from cellplan.search.assign.problem.instance import Instance, with_rules
+from cellplan.search.assign.problem.moving_blocks import Column, with_columns
+from cellplan.search.assign.problem.rules import TaskRules
+from cellplan.search.assign.problem.table import TaskMode
 
 STEP = 0.02  # [s]
 ROBOTS = ("a", "b")

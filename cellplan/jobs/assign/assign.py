@@ -20,9 +20,9 @@ from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
 from cellplan.runs.solution import Run, Solution
 from cellplan.runs.solve import solve
-from cellplan.search.assign.blocks import BlockAnswer
-from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.order import SequencedBlocks
+from cellplan.search.assign.problem.instance import Instance
+from cellplan.search.assign.schedules.blocks import BlockAnswer
+from cellplan.search.assign.schedules.order import SequencedBlocks
 
 ROUNDS: Final = 4  # programs that are solved until one passes
 NEARLY: Final = 1.05  # [-] of the cycle of the program: so long are those of its alternatives at most

@@ -18,10 +18,10 @@ from cellplan.runs.early_clearance import without_curves
 from cellplan.runs.plan.sequence import PlannedStage, plan_work
 from cellplan.runs.solve import render_program
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.clearance import ScenesByRobot, spread_rows
-from cellplan.search.assign.goals import Stations, TaskGoal
-from cellplan.search.assign.instance import End
-from cellplan.search.assign.moving_blocks import Candidate, Column, MovingBlockSearch
+from cellplan.search.assign.problem.clearance import ScenesByRobot, spread_rows
+from cellplan.search.assign.problem.goals import Stations, TaskGoal
+from cellplan.search.assign.problem.instance import End
+from cellplan.search.assign.problem.moving_blocks import Candidate, Column, MovingBlockSearch
 
 MOST_PLANNED: Final = 40  # candidates
 MOST_ALIKE: Final = 2  # columns of the same tasks by the same robots

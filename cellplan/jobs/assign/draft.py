@@ -19,9 +19,9 @@ from cellplan.model.robot.robot import configuration_in_si, start_keys
 from cellplan.model.settings.assign import POSTURE_LIMIT, AssignEntry
 from cellplan.runs.plan.program_faults import refuse_crowded_homes
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.goals import Stations, task_goals
-from cellplan.search.assign.reach import places_in_reach
-from cellplan.search.assign.table import BranchFollower
+from cellplan.search.assign.problem.goals import Stations, task_goals
+from cellplan.search.assign.problem.reach import places_in_reach
+from cellplan.search.assign.problem.table import BranchFollower
 
 POSE_KEYS = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")  # of the part in the world
 RESTS = (Mode.SEMI_COORDINATED, Mode.PART_AT_REST)  # modes in which the part rests while tools are at work

@@ -23,8 +23,8 @@ from cellplan.report.record.rows import Tables, columns_of, flat
 from cellplan.runs.solution import Run, Solution
 from cellplan.runs.solve import with_verdict
 from cellplan.runs.write_run import versions, write_run
-from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.order import SequencedBlocks
+from cellplan.search.assign.problem.instance import Instance
+from cellplan.search.assign.schedules.order import SequencedBlocks
 
 SCHEMA: Final = "cellplan.assignment/1"
 BOUND_SCHEMA: Final = "cellplan.assignment-bound/1"

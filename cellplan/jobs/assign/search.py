@@ -12,20 +12,20 @@ from cellplan.model.cell.cell import Timing
 from cellplan.model.progress import Progress
 from cellplan.runs.plan.retiming import joint_bounds, transfer_retimer
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.blocks import BlockAnswer, solve_blocks
-from cellplan.search.assign.clearance import AssignmentClearance
-from cellplan.search.assign.durations import with_stand_offs
-from cellplan.search.assign.goals import TaskGoal, task_goals
-from cellplan.search.assign.greedy import greedy_schedule, improved
-from cellplan.search.assign.instance import Instance, find_conflicts, least_transfer, with_rules
-from cellplan.search.assign.moving_blocks import joint_angles, with_columns
-from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer
-from cellplan.search.assign.refined import Refinement
-from cellplan.search.assign.rules import TaskRules, tasks_before
-from cellplan.search.assign.solver import is_installed
-from cellplan.search.assign.stations import choose_stations
-from cellplan.search.assign.table import Key, ModeSearch, ModeTable, TaskMode
-from cellplan.search.assign.transfers import TransferCertifier
+from cellplan.search.assign.problem.clearance import AssignmentClearance
+from cellplan.search.assign.problem.durations import with_stand_offs
+from cellplan.search.assign.problem.goals import TaskGoal, task_goals
+from cellplan.search.assign.problem.instance import Instance, find_conflicts, least_transfer, with_rules
+from cellplan.search.assign.problem.moving_blocks import joint_angles, with_columns
+from cellplan.search.assign.problem.rules import TaskRules, tasks_before
+from cellplan.search.assign.problem.stations import choose_stations
+from cellplan.search.assign.problem.table import Key, ModeSearch, ModeTable, TaskMode
+from cellplan.search.assign.schedules.blocks import BlockAnswer, solve_blocks
+from cellplan.search.assign.schedules.greedy import greedy_schedule, improved
+from cellplan.search.assign.schedules.order import Refusal, SequencedBlocks, Sequencer
+from cellplan.search.assign.schedules.refined import Refinement
+from cellplan.search.assign.schedules.solver import is_installed
+from cellplan.search.assign.schedules.transfers import TransferCertifier
 
 EFFORT: Final = (2.0, 5.0, 15.0, 60.0, 240.0)  # of the block model, in units of deterministic time, by --effort
 LITTLE: Final = 1.0  # likewise, of what is told beside the program

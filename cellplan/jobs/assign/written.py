@@ -11,9 +11,9 @@ from cellplan.geometry.arrays import Array
 from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.model.cell.cell import Cell
 from cellplan.model.robot.robot import RobotModel, start_keys
-from cellplan.search.assign.goals import STRAIGHT, TaskGoal, task_goals
-from cellplan.search.assign.instance import End, Instance
-from cellplan.search.assign.order import SequencedBlocks, order_values
+from cellplan.search.assign.problem.goals import STRAIGHT, TaskGoal, task_goals
+from cellplan.search.assign.problem.instance import End, Instance
+from cellplan.search.assign.schedules.order import SequencedBlocks, order_values
 
 
 def written_cell(draft: AssignmentDraft, instance: Instance, sequenced: SequencedBlocks) -> Cell:

@@ -13,7 +13,7 @@ from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.jobs.assign.result import assign_record, write_assignment
 from cellplan.runs.solve import solve
 from cellplan.runs.write_run import write_run
-from cellplan.search.assign.schedule import refuse_impossible
+from cellplan.search.assign.schedules.schedule import refuse_impossible
 
 OPEN = Path(__file__).resolve().parents[3] / "examples" / "open_tasks" / "open_frame.yaml"
 pytestmark = pytest.mark.slow

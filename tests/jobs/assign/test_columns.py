@@ -16,8 +16,8 @@ from cellplan.model.progress import silent
 from cellplan.runs.solve import solve
 from cellplan.runs.write_run import write_run
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.goals import task_goals
-from cellplan.search.assign.schedule import refuse_impossible
+from cellplan.search.assign.problem.goals import task_goals
+from cellplan.search.assign.schedules.schedule import refuse_impossible
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "open_tasks"
 AT_REST = 35.6  # [s] of the same rings in six arcs each, at six poses of the part

@@ -17,9 +17,9 @@ from cellplan.jobs.assign.assign import assign
 from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.jobs.assign.written import mirrored_goals
 from cellplan.runs.solve import solve
-from cellplan.search.assign.goals import task_goals
-from cellplan.search.assign.schedule import refuse_impossible
-from cellplan.search.assign.table import BranchFollower
+from cellplan.search.assign.problem.goals import task_goals
+from cellplan.search.assign.problem.table import BranchFollower
+from cellplan.search.assign.schedules.schedule import refuse_impossible
 
 SCRIPT = Path(__file__).resolve().parents[3] / "benchmarks" / "assign.py"
 ROUNDING = 1e-6  # [m, rad] errors that configurations are searched down to

@@ -19,7 +19,7 @@ from cellplan.model.seeds import generator
 from cellplan.planning.start.inverse_kinematics import damped_move, on_nearest_turns, random_configurations
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.kinematics.spherical_wrist import SphericalWristArm
-from cellplan.search.assign.goals import Stations, TaskGoal
+from cellplan.search.assign.problem.goals import Stations, TaskGoal
 
 MARGIN: Final = float(np.radians(4.0))  # [rad] that modes stay away from joint limits
 LONGEST_MOVE: Final = 0.9  # [rad] of a joint between two poses of a mode: more is another branch, or a singular place

@@ -6,10 +6,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
-from cellplan.search.assign.clearance import AssignmentClearance
-from cellplan.search.assign.goals import TaskGoal
-from cellplan.search.assign.rules import TaskRules
-from cellplan.search.assign.table import Key, ModeTable, TaskMode
+from cellplan.search.assign.problem.clearance import AssignmentClearance
+from cellplan.search.assign.problem.goals import TaskGoal
+from cellplan.search.assign.problem.rules import TaskRules
+from cellplan.search.assign.problem.table import Key, ModeTable, TaskMode
 
 MOST_FREE: Final = 2  # free modes of one robot for one task at one station
 SECOND: Final = 0.25  # [-] worth of a pose for a task and a robot, over those that they have already and one

@@ -9,12 +9,12 @@ from builders.assignments import STEP, small_instance
 
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.planning.transfer.straight_time import straight_steps
-from cellplan.search.assign.durations import with_stand_offs
-from cellplan.search.assign.greedy import greedy_schedule
-from cellplan.search.assign.instance import End, Instance, least_transfer, with_rules
-from cellplan.search.assign.order import Refusal, Sequencer, relocations
-from cellplan.search.assign.rules import TaskRules
-from cellplan.search.assign.schedule import BlockSchedule, in_order
+from cellplan.search.assign.problem.durations import with_stand_offs
+from cellplan.search.assign.problem.instance import End, Instance, least_transfer, with_rules
+from cellplan.search.assign.problem.rules import TaskRules
+from cellplan.search.assign.schedules.greedy import greedy_schedule
+from cellplan.search.assign.schedules.order import Refusal, Sequencer, relocations
+from cellplan.search.assign.schedules.schedule import BlockSchedule, in_order
 
 
 def steps_of(instance: Instance, schedule: BlockSchedule, picked: dict[str, End]) -> int:

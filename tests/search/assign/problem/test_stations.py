@@ -7,12 +7,12 @@ import pytest
 
 from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.clearance import AssignmentClearance
-from cellplan.search.assign.goals import TaskGoal, task_goals
-from cellplan.search.assign.stations import choose_stations
-from cellplan.search.assign.table import ModeSearch, ModeTable
+from cellplan.search.assign.problem.clearance import AssignmentClearance
+from cellplan.search.assign.problem.goals import TaskGoal, task_goals
+from cellplan.search.assign.problem.stations import choose_stations
+from cellplan.search.assign.problem.table import ModeSearch, ModeTable
 
-OPEN = Path(__file__).resolve().parents[3] / "examples" / "open_tasks" / "open_frame.yaml"
+OPEN = Path(__file__).resolve().parents[4] / "examples" / "open_tasks" / "open_frame.yaml"
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from builders.scene_builders import placed, stick
 from cellplan.files.robots.bundled import load_bundled
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import pose
-from cellplan.search.assign.table import LONGEST_MOVE, MARGIN, BranchFollower
+from cellplan.search.assign.problem.table import LONGEST_MOVE, MARGIN, BranchFollower
 
 BASE = pose((0.3, -0.2, 0.5), (0.0, 0.0, 0.7))
 

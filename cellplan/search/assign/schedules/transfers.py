@@ -16,9 +16,9 @@ from cellplan.planning.transfer.reasons import Tried
 from cellplan.planning.transfer.straight_moves import StraightMoves
 from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop, all_stops, is_preceding
-from cellplan.search.assign.schedule import BlockSchedule, refuse_impossible
+from cellplan.search.assign.problem.instance import Instance
+from cellplan.search.assign.schedules.order import Refusal, SequencedBlocks, Sequencer, Stop, all_stops, is_preceding
+from cellplan.search.assign.schedules.schedule import BlockSchedule, refuse_impossible
 
 MOST_TRIED: Final = 400  # orders of blocks, and tasks exchanged between them
 MOST_SETTLED: Final = 30  # choices of modes until no transfer of the best one is newly refused

@@ -14,7 +14,7 @@ from cellplan.model.report.report import Check
 from cellplan.model.settings.program import groups_of
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths
-from cellplan.search.assign.table import Key
+from cellplan.search.assign.problem.table import Key
 
 ARC_TIMES: Final = 400  # at which the distance of two arcs is taken
 ROUNDING: Final = 1e-9  # [steps] of a time

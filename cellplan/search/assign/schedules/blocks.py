@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, Final
 
-from cellplan.search.assign.cliques import cliques_at
-from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.rule_rows import add_rest_rows, add_rule_rows, add_service_rows
-from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order
-from cellplan.search.assign.solver import Solved, new_model
-from cellplan.search.assign.table import Key
+from cellplan.search.assign.problem.instance import Instance
+from cellplan.search.assign.problem.table import Key
+from cellplan.search.assign.schedules.cliques import cliques_at
+from cellplan.search.assign.schedules.rule_rows import add_rest_rows, add_rule_rows, add_service_rows
+from cellplan.search.assign.schedules.schedule import BlockSchedule, Choice, in_order
+from cellplan.search.assign.schedules.solver import Solved, new_model
 
 MOST_OTHERS: Final = 3  # schedules that are nearly as good
 HORIZON: Final = 10_000_000  # [steps] no cycle is longer

@@ -16,10 +16,10 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import inverse, rotation_vector
 from cellplan.model.cell.cell import Cell
-from cellplan.search.assign.clearance import ScenesByRobot
-from cellplan.search.assign.goals import Stations, TaskGoal
-from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.table import MARGIN, Key, ModeSearch, TaskMode
+from cellplan.search.assign.problem.clearance import ScenesByRobot
+from cellplan.search.assign.problem.goals import Stations, TaskGoal
+from cellplan.search.assign.problem.instance import Instance
+from cellplan.search.assign.problem.table import MARGIN, Key, ModeSearch, TaskMode
 
 OFF_AXIS: Final = 2e-3  # [m] that a coaxial path is beside the one that the turn gives
 OFF_TURN: Final = float(np.radians(2.0))  # [rad] likewise of its orientations, and of angles of tasks in one block

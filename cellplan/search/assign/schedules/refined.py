@@ -6,12 +6,12 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.search.assign.clearance import AssignmentClearance
-from cellplan.search.assign.goals import Stations
-from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.order import SequencedBlocks, Sequencer
-from cellplan.search.assign.table import Key, ModeSearch, TaskMode
-from cellplan.search.assign.transfers import TransferCertifier
+from cellplan.search.assign.problem.clearance import AssignmentClearance
+from cellplan.search.assign.problem.goals import Stations
+from cellplan.search.assign.problem.instance import Instance
+from cellplan.search.assign.problem.table import Key, ModeSearch, TaskMode
+from cellplan.search.assign.schedules.order import SequencedBlocks, Sequencer
+from cellplan.search.assign.schedules.transfers import TransferCertifier
 
 FINER: Final = 2  # turns of the tool for one that was compared before
 CHOICES: Final = 600  # of modes and directions of all robots in a block together

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import Any
 
-from cellplan.search.assign.instance import Instance
+from cellplan.search.assign.problem.instance import Instance
 
 Literals = Mapping[tuple[str, Any], Any]
 

@@ -13,10 +13,10 @@ from typing import Final, Self
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.search.assign.goals import TaskGoal
-from cellplan.search.assign.instance import CLEANED, READY, End, Instance, standing
-from cellplan.search.assign.schedule import BlockSchedule, in_order
-from cellplan.search.assign.table import Key
+from cellplan.search.assign.problem.goals import TaskGoal
+from cellplan.search.assign.problem.instance import CLEANED, READY, End, Instance, standing
+from cellplan.search.assign.problem.table import Key
+from cellplan.search.assign.schedules.schedule import BlockSchedule, in_order
 
 MOST_PERMUTED: Final = 7  # stations of which all tours are compared
 CROWDED: Final = 10**6  # [steps] more than any cycle that is chosen

@@ -8,13 +8,13 @@ import pytest
 from builders.assignments import small_instance
 
 from cellplan.errors import NoSolutionError
-from cellplan.search.assign.blocks import solve_blocks
-from cellplan.search.assign.cliques import cliques_at, excludes
-from cellplan.search.assign.greedy import greedy_schedule, improved
-from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.order import Sequencer, waits_of
-from cellplan.search.assign.rules import ServiceRule, TaskRules
-from cellplan.search.assign.schedule import BlockSchedule, in_order, refuse_impossible
+from cellplan.search.assign.problem.instance import Instance
+from cellplan.search.assign.problem.rules import ServiceRule, TaskRules
+from cellplan.search.assign.schedules.blocks import solve_blocks
+from cellplan.search.assign.schedules.cliques import cliques_at, excludes
+from cellplan.search.assign.schedules.greedy import greedy_schedule, improved
+from cellplan.search.assign.schedules.order import Sequencer, waits_of
+from cellplan.search.assign.schedules.schedule import BlockSchedule, in_order, refuse_impossible
 
 LEAST = 5  # [steps] of a transfer
 

@@ -3,9 +3,9 @@
 import pytest
 from builders.assignments import small_instance
 
-from cellplan.search.assign.greedy import greedy_schedule
-from cellplan.search.assign.schedule import refuse_impossible
-from cellplan.search.assign.transfers import exchanges
+from cellplan.search.assign.schedules.greedy import greedy_schedule
+from cellplan.search.assign.schedules.schedule import refuse_impossible
+from cellplan.search.assign.schedules.transfers import exchanges
 
 
 @pytest.mark.parametrize("chained", [False, True])

@@ -6,8 +6,8 @@ import numpy as np
 from builders.assignments import small_instance
 
 from cellplan.planning.timing.retime import JointLimitsInTime
-from cellplan.search.assign.durations import with_stand_offs
-from cellplan.search.assign.table import TaskMode
+from cellplan.search.assign.problem.durations import with_stand_offs
+from cellplan.search.assign.problem.table import TaskMode
 
 STEP = 0.01  # [s]
 

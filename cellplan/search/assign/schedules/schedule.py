@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from cellplan.search.assign.goals import TaskGoal
-from cellplan.search.assign.instance import Instance
+from cellplan.search.assign.problem.goals import TaskGoal
+from cellplan.search.assign.problem.instance import Instance
 
 Choice = tuple[str, int]  # robot and station of a task
 

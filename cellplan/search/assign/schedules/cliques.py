@@ -5,7 +5,7 @@ The block model and the bound both say that a station takes at least as long as 
 
 from collections.abc import Sequence
 
-from cellplan.search.assign.instance import Instance
+from cellplan.search.assign.problem.instance import Instance
 
 Pair = tuple[str, str]  # task and robot
 

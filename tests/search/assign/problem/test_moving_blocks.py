@@ -11,11 +11,11 @@ from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.model.settings.task import WeldPositionEntry
 from cellplan.model.settings.units import Deg
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.clearance import ScenesByRobot
-from cellplan.search.assign.goals import Stations, TaskGoal, task_goals
-from cellplan.search.assign.moving_blocks import MovingBlockSearch, joint_angles
+from cellplan.search.assign.problem.clearance import ScenesByRobot
+from cellplan.search.assign.problem.goals import Stations, TaskGoal, task_goals
+from cellplan.search.assign.problem.moving_blocks import MovingBlockSearch, joint_angles
 
-DRUM = Path(__file__).resolve().parents[3] / "examples" / "open_tasks" / "drum.yaml"
+DRUM = Path(__file__).resolve().parents[4] / "examples" / "open_tasks" / "drum.yaml"
 LEVEL = WeldPositionEntry(slope_deg=(Deg(-1.0), Deg(1.0)), rotation_deg=(Deg(-1.0), Deg(1.0)))
 
 

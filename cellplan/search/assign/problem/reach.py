@@ -14,7 +14,7 @@ from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.seeds import generator
 from cellplan.planning.start.inverse_kinematics import random_configurations
 from cellplan.scene.kinematics.screw_chain import ScrewChain
-from cellplan.search.assign.goals import Stations, TaskGoal
+from cellplan.search.assign.problem.goals import Stations, TaskGoal
 
 AROUND: Final = np.linspace(-0.6, 0.6, 7)  # [m] from the middle of the operators' reach, along each axis
 SAMPLES: Final = 2000  # configurations that tell the reach of an operator

@@ -5,8 +5,8 @@ from dataclasses import replace
 from itertools import combinations, product
 
 from cellplan.errors import NoSolutionError
-from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order, keeps_columns
+from cellplan.search.assign.problem.instance import Instance
+from cellplan.search.assign.schedules.schedule import BlockSchedule, Choice, in_order, keeps_columns
 
 
 def greedy_schedule(instance: Instance) -> BlockSchedule:

@@ -17,8 +17,8 @@ from cellplan.geometry.arrays import Array, Indices
 from cellplan.scene.bodies import Kind
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.goals import Stations
-from cellplan.search.assign.table import TaskMode
+from cellplan.search.assign.problem.goals import Stations
+from cellplan.search.assign.problem.table import TaskMode
 
 LOOKED_AT: Final = 5  # configurations of a mode that are examined, those before and after its path among them
 MET: Final = 4  # configurations of each of two modes that are combined

@@ -7,10 +7,10 @@ import pytest
 
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.assign.draft import AssignmentDraft
-from cellplan.search.assign.goals import task_goals
-from cellplan.search.assign.reach import AROUND, Reach, places_in_reach
+from cellplan.search.assign.problem.goals import task_goals
+from cellplan.search.assign.problem.reach import AROUND, Reach, places_in_reach
 
-OPEN = Path(__file__).resolve().parents[3] / "examples" / "open_tasks" / "open_frame.yaml"
+OPEN = Path(__file__).resolve().parents[4] / "examples" / "open_tasks" / "open_frame.yaml"
 PLACES = 3
 
 

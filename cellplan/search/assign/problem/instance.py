@@ -11,11 +11,11 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.planning.transfer.straight_time import straight_steps
-from cellplan.search.assign.clearance import AssignmentClearance
-from cellplan.search.assign.durations import stand_off_steps
-from cellplan.search.assign.goals import Stations, TaskGoal
-from cellplan.search.assign.rules import TaskRules
-from cellplan.search.assign.table import Key, TaskMode
+from cellplan.search.assign.problem.clearance import AssignmentClearance
+from cellplan.search.assign.problem.durations import stand_off_steps
+from cellplan.search.assign.problem.goals import Stations, TaskGoal
+from cellplan.search.assign.problem.rules import TaskRules
+from cellplan.search.assign.problem.table import Key, TaskMode
 
 Conflict = frozenset[Key]  # two of task, robot and station that cannot be at work together
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from cellplan.files.cell.load import load_open_cell
-from cellplan.search.assign.rules import TaskRules, tasks_before
+from cellplan.search.assign.problem.rules import TaskRules, tasks_before
 
-OPEN = Path(__file__).resolve().parents[3] / "examples" / "open_tasks" / "open_frame.yaml"
+OPEN = Path(__file__).resolve().parents[4] / "examples" / "open_tasks" / "open_frame.yaml"
 
 
 @pytest.fixture

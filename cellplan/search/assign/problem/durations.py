@@ -8,8 +8,8 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.planning.transfer.straight_time import straight_steps
-from cellplan.search.assign.goals import TaskGoal
-from cellplan.search.assign.table import Key, TaskMode
+from cellplan.search.assign.problem.goals import TaskGoal
+from cellplan.search.assign.problem.table import Key, TaskMode
 
 ROUNDED = 2  # steps that a straight move has beyond its time at most
 

@@ -1,0 +1,1 @@
+"""Schedules of an assignment: blocks, their order, modes and transfers."""
