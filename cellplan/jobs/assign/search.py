@@ -28,7 +28,7 @@ from cellplan.search.assign.schedules.solver import is_installed
 from cellplan.search.assign.schedules.transfers import TransferCertifier
 
 EFFORT: Final = (2.0, 5.0, 15.0, 60.0, 240.0)  # of the block model, in units of deterministic time, by --effort
-LITTLE: Final = 1.0  # likewise, of what is told beside the program
+LITTLE: Final = 1.0  # likewise, of the figures beside the program
 MANY: Final = 25  # tasks; more of them get more work, by the square of their number
 LOOKED_FOR: Final = (
     "torch and weld position",
