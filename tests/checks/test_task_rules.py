@@ -63,6 +63,7 @@ def test_tasks_in_turn_begin_apart_by_a_path_and_what_lies_between() -> None:
     assert together.at_s == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 def test_turns_and_robots_are_judged_by_what_the_program_does() -> None:
     """One alternation kept, and tasks of two robots that one should do."""
     turns = OrderEntry(alternate=(("ring",), ("frame",)))

@@ -208,6 +208,7 @@ def _at(place: Any) -> BaseGrid:
     return BaseGrid(x=(place["x_mm"],) * 2, y=(place["y_mm"],) * 2)
 
 
+@pytest.mark.slow
 def test_a_base_from_which_nothing_is_reached_is_mapped_too(two_tasks: Cell) -> None:
     away = two_tasks.with_values({"robots.right.base.x_mm": 9000})
 

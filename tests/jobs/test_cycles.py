@@ -57,6 +57,7 @@ def planar(tmp_path):
     return load
 
 
+@pytest.mark.slow
 def test_an_arm_with_spare_joints_drifts_from_cycle_to_cycle(planar):
     """The pseudo-inverse is not repetitive (Nicolato 2007, chapter 4)."""
     report = solve(planar(4, words="repeat: 2\n    time_law: constant", duration=4, step=0.004)).runs[0].report

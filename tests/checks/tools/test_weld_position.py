@@ -17,6 +17,7 @@ def checks_of(values: dict[str, object]) -> dict[tuple[str, str], Check]:
     return {(check.name, check.subject): check for check in report.checks if check.name in names}
 
 
+@pytest.mark.slow
 def test_horizontal_tools_weld_all_slopes_of_a_ring_and_the_walls_of_a_frame() -> None:
     """A ring on a wall runs up and down, and level at its top and bottom; the tool looks level all along."""
     checks = checks_of(
@@ -42,6 +43,7 @@ def test_tasks_that_demand_nothing_have_no_check() -> None:
     assert checks_of({}) == {}
 
 
+@pytest.mark.slow
 def test_a_level_tool_keeps_a_limit_of_a_right_angle() -> None:
     """Its angle is 90 deg but for the rounding of joint positions."""
     assert checks_of({"tasks.frame.torch": {"within_deg": 90}})["torch_angle", "frame"].passed

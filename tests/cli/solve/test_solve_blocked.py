@@ -49,6 +49,7 @@ def test_a_transfer_that_is_not_found_has_a_name_a_pair_an_amount_and_a_page(
     assert 0.0 < failure["at"] < times[-1]
 
 
+@pytest.mark.slow
 def test_a_script_reads_the_pair_the_place_and_the_share_of_the_try(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

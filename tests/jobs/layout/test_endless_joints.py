@@ -32,6 +32,7 @@ def test_an_endless_joint_changes_nothing_where_two_turns_do_not_bind(
     assert endless["top"] == bounded["top"]
 
 
+@pytest.mark.slow
 def test_a_cell_in_which_no_joint_has_limits_has_no_margin(tmp_path: Path) -> None:
     record = searched(tmp_path, left=NAMES, right=NAMES).record
 

@@ -84,6 +84,7 @@ def test_a_layout_that_solve_passes_is_followed_and_certified(tmp_path: Path, po
     assert layout_lines(searched.record, tmp_path / "study")[1] == "  as given: conforms"
 
 
+@pytest.mark.slow
 def test_the_shortest_cycle_of_the_given_motion_is_one_that_solve_passes(tmp_path: Path) -> None:
     request = request_of(tmp_path, points=25, wave=4.0)
     record = given_record(prepared(LayoutRequest(cell=request.cell)))

@@ -57,9 +57,8 @@ WITH_MIMIC = (
 )  # a joint that a linkage moves, and one that it carries
 
 
-@pytest.mark.parametrize(
-    "lines", [pytest.param(FOUR_AXES, id="four axes"), pytest.param(WITH_MIMIC, id="mimic", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("lines", [pytest.param(FOUR_AXES, id="four axes"), pytest.param(WITH_MIMIC, id="mimic")])
 def test_the_part_is_held_where_the_tool_of_a_short_arm_can_be(tmp_path: Path, lines: tuple[str, ...]) -> None:
     write_urdf(tmp_path, *lines)
     (tmp_path / "cell.yaml").write_text(CELL, encoding="utf-8")
