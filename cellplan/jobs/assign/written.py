@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,6 +14,13 @@ from cellplan.model.robot.robot import RobotModel, start_keys
 from cellplan.search.assign.problem.goals import STRAIGHT, TaskGoal, task_goals
 from cellplan.search.assign.problem.instance import End, Instance
 from cellplan.search.assign.schedules.order import SequencedBlocks, order_values
+
+ANGLES: Final = np.radians(np.arange(0.0, 360.0, 45.0))
+CORNERS: Final = {
+    "circle": [tuple(np.round([np.cos(it), np.sin(it)], 9).tolist()) for it in ANGLES],
+    "rectangle": [(1, 1), (-1, 1), (-1, -1), (1, -1)],
+    "rhombus": [(1, 0), (0, 1), (-1, 0), (0, -1)],
+}  # starts of closed shapes, the one without start_at first
 
 
 def written_cell(draft: AssignmentDraft, instance: Instance, sequenced: SequencedBlocks) -> Cell:
@@ -47,7 +54,7 @@ def task_values(cell: Cell, end: End, before: tuple[str, ...], holder: tuple[str
     """
     task, robot = cell.task(end.mode.task), end.mode.robot
     place = f"tasks.{task.name}"
-    values: dict[str, object] = {f"{place}.robot": robot}
+    values: dict[str, object] = {f"{place}.robot": robot, **dict(end.mode.path_values)}
     spin = float(np.round(np.degrees(np.remainder(task.spin + end.mode.spin + np.pi, 2.0 * np.pi) - np.pi), 9))
     if end.mode.spin and not task.is_spin_free:
         values[f"{place}.spin_deg"] = spin
@@ -97,6 +104,38 @@ def mirrored_goals(draft: AssignmentDraft, goals: Sequence[TaskGoal]) -> list[Ta
     back = {goal.name: goal.X_PT[::-1] for goal in task_goals(cell.with_values(values), draft.robots)}
     turned = [goal for goal in goals if f"tasks.{goal.name}.tool_axis" in values]
     return [replace(goal, X_PT=back[goal.name], is_mirrored=True) for goal in turned]
+
+
+def goals_with_other_starts(draft: AssignmentDraft, goals: Sequence[TaskGoal]) -> list[TaskGoal]:
+    """Tasks along circles, rectangles and rhombi without a given start, from each of their other starts.
+
+    There are none where arcs have to keep a distance, which is known for the paths as they are written.
+    """
+    cell = draft.cell
+    if "start" not in draft.settings.free or cell.program.arcs_apart_mm is not None:
+        return []
+    starts = {goal.name: _starts(cell, goal.name) for goal in goals if goal.start_q is None}
+    others = list[TaskGoal]()
+    for number in range(max(map(len, starts.values()), default=0)):
+        chosen = {name: options[number] for name, options in starts.items() if number < len(options)}
+        begun = task_goals(cell.with_values(dict(chosen.values())), draft.robots)
+        X_PT = {goal.name: goal.X_PT for goal in begun}
+        others += [
+            replace(goal, X_PT=X_PT[goal.name], path_values=(chosen[goal.name],))
+            for goal in goals
+            if goal.name in chosen
+        ]
+    return others
+
+
+def _starts(cell: Cell, task: str) -> list[tuple[str, object]]:
+    """Addresses and values of the starts of a path beside its own: 45 deg apart on a circle, else its corners."""
+    tasks: Any = cell.origin.document["tasks"]
+    path, place = tasks[task]["path"], f"tasks.{task}.path"
+    shape = next((name for name in CORNERS if path.get(name) is not None), None)
+    if shape is None or f"{place}.{shape}.start_at" in cell.origin.lines:
+        return []
+    return [(f"{place}.{shape}.start_at", corner) for corner in CORNERS[shape][1:]]
 
 
 def written_points(cell: Cell, task: str) -> tuple[object, ...] | None:

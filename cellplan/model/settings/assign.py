@@ -20,7 +20,7 @@ StationChoice = Annotated[
     | Annotated[dict[str, tuple[float, float, float]], Field(min_length=1), Tag("<mapping>")],
     by_kind(STATION_WORDS, list=tuple, mapping=dict),
 ]
-FreeWord = Literal["direction", "spin", "station"]
+FreeWord = Literal["direction", "start", "spin", "station"]
 
 
 class AssignEntry(Entry):
@@ -36,10 +36,10 @@ class AssignEntry(Entry):
         "When absent those that the tasks and the start of the holder give.",
     )
     free: tuple[FreeWord, ...] = Field(
-        default=("direction", "spin", "station"),
+        default=("direction", "start", "spin", "station"),
         description="What may be chosen anew for every task: the direction of an open polyline whose tool stands "
-        "across it, or is mirrored across it for the way back, the turn of the tool about its axis, the pose of the "
-        "part.",
+        "across it, or is mirrored across it for the way back, the start of a circle, rectangle or rhombus without "
+        "start_at, the turn of the tool about its axis, the pose of the part.",
     )
     spin_step_deg: Annotated[Deg, Within(ge=5.0, le=360.0)] = Field(
         default=Deg(60.0), description="Step of the turns of the tool about its axis that are compared."

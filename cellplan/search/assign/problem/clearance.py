@@ -105,7 +105,7 @@ class AssignmentClearance:
     stations: Stations
     conflict: float
     examined: tuple[int, int] = (0, 0)
-    _fitting: dict[tuple[str, str, float, tuple[bool, ...]], bool] = field(default_factory=dict)
+    _fitting: dict[tuple[object, ...], bool] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Parts of the scene are made when they are needed, once."""
@@ -127,7 +127,7 @@ class AssignmentClearance:
 
     def tool_fits(self, mode: TaskMode) -> bool:
         """Whether its tool keeps its distance from the part: the same for all arms, branches and poses of the part."""
-        key = mode.task, mode.robot, mode.spin, mode.directions
+        key = mode.task, mode.robot, mode.spin, mode.directions, mode.path_values
         if key not in self._fitting:
             self._fitting[key] = self._keeps_apart(self._scenes.tools[mode.robot], mode, np.arange(len(mode.q)))
         return self._fitting[key]

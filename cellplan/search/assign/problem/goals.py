@@ -38,6 +38,7 @@ class TaskGoal:
     holder_q: Array | None = None  # given configuration of the holder in [rad] or [m], shape (n,); None for any station
     start_q: Array | None = None  # given start of its robot likewise; None for any
     is_spin_free: bool = True  # whether the tool may be turned about its axis beside what is written
+    path_values: tuple[tuple[str, object], ...] = ()  # with which its path begins elsewhere, by address in a cell file
     stand_off_steps: int | None = None  # of the steps where it is retimed, those of approach and retraction
 
 

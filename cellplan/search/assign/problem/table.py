@@ -45,6 +45,7 @@ class TaskMode:
     spin: float  # turn of the tool about its axis beside that of the task in [rad]
     q: Array  # configurations before, along and after the path in [rad] or [m], shape (S + 2, n)
     margin: float  # smallest distance from a joint limit in [rad] or [m]
+    path_values: tuple[tuple[str, object], ...] = ()  # those of its goal
     directions: tuple[bool, ...] = (False, True)  # whether it may be done as written, and from its end to its begin
 
 
@@ -132,6 +133,7 @@ class ModeSearch:
                 spin=spin,
                 q=result.q[index],
                 margin=float(result.margins[index]),
+                path_values=goal.path_values,
                 directions=tuple(it for it in (False, True) if allowed[it][place]),
             )
             if self.tool_fits(mode):
