@@ -7,7 +7,7 @@ from typing import Final
 from cellplan.errors import ImpossibleTasksError, NoSolutionError
 from cellplan.jobs.assign.columns import verified_columns
 from cellplan.jobs.assign.draft import AssignmentDraft
-from cellplan.jobs.assign.written import goals_with_other_starts, mirrored_goals, written_points
+from cellplan.jobs.assign.written import goals_written_otherwise, written_points
 from cellplan.model.cell.cell import Timing
 from cellplan.model.progress import Progress
 from cellplan.runs.plan.retiming import joint_bounds, transfer_retimer
@@ -77,8 +77,7 @@ class AssignmentSearch:
         clearance = AssignmentClearance(
             scene=self._scene, home=draft.home, stations=stations, conflict=settings.conflict_mm.si
         )
-        directed = [*goals, *mirrored_goals(draft, goals), *goals_with_other_starts(draft, goals)]
-        fits = clearance.tool_fits
+        directed, fits = [*goals, *goals_written_otherwise(draft, goals)], clearance.tool_fits
         search = ModeSearch(cell=cell, goals=directed, stations=stations, spins=draft.spins(), tool_fits=fits)
         table = search.table()
         certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))

@@ -93,6 +93,11 @@ def backwards_values(cell: Cell, task: str) -> dict[str, object] | None:
     return values | {f"{place}.tool_axis": [float(it) for it in np.round(mirrored, 9) + 0.0]}
 
 
+def goals_written_otherwise(draft: AssignmentDraft, goals: Sequence[TaskGoal]) -> list[TaskGoal]:
+    """The same tasks as a cell file may also have them: done backwards with a mirrored tool, or begun elsewhere."""
+    return [*mirrored_goals(draft, goals), *goals_with_other_starts(draft, goals)]
+
+
 def mirrored_goals(draft: AssignmentDraft, goals: Sequence[TaskGoal]) -> list[TaskGoal]:
     """The ways back of tasks whose tool pushes or drags, with the tool mirrored across the path."""
     cell, values = draft.cell, dict[str, object]()
