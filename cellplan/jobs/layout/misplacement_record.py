@@ -32,8 +32,12 @@ class MisplacementRecord(TypedDict):
 
     position_mm: Annotated[Number, "by how much every base is off along each axis"]
     orientation_deg: Annotated[Number, "by how much every base is off about the vertical"]
-    cycle_s: Annotated[Number, "the one cycle in which the layout and all its corners keep their limits"]
-    nominal_cycle_s: Annotated[Number, "shortest cycle of the layout with all bases in place, by the search"]
+    cycle_s: Annotated[
+        Number, "the one cycle in which the layout and all its corners keep their limits; of a program its longest"
+    ]
+    nominal_cycle_s: Annotated[
+        Number, "shortest cycle with all bases in place, by the search; of a program the certified one"
+    ]
     seeded: Annotated[int, "seeded random corners"]
     seeded_kept: Annotated[int, "those of them that passed every check in this cycle"]
     by_derivatives: Annotated[int, "corners that are the worst for a limit, to first order"]

@@ -112,7 +112,7 @@ def _misplaced(record: Record) -> Iterator[str]:
     if record_ is None:
         return
     by = f"{record_['position_mm']:g} mm and {record_['orientation_deg']:g} deg"
-    yield f"with every base off by {by}, sampled, motion planned anew, in this one cycle:"
+    yield f"with every base off by {by}, sampled, motion planned anew, within {record_['cycle_s']:g} s:"
     yield (
         f"  {record_['seeded_kept']} of {record_['seeded']} seeded corners, {record_['by_derivatives_kept']} of "
         f"{record_['by_derivatives']} worst corners by derivatives, {record_['ends_kept']} of {record_['ends']} single "

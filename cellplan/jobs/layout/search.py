@@ -103,6 +103,8 @@ class _Search:
     def _best(self, finished: Finished) -> CandidateResult | None:
         """The first candidate that passes, best first; of programs, whose transfers are estimates, the fastest one."""
         passed = list[CandidateResult]()
+        is_estimate = self.ready.phases is not None and self.request.objective is Objective.CYCLE
+        is_estimate = is_estimate and self.ready.variables.settings.misplacement is None
         for finalist in self.finish.ordered(self.candidates(finished))[:CANDIDATES]:
             number = finalist.trial.number
             if number not in self.tried:
@@ -110,10 +112,10 @@ class _Search:
                 self.tried[number] = self.finish.certified(finalist)
             if self.tried[number].passed:
                 passed.append(self.tried[number])
-                if self.ready.phases is None or self.request.objective is not Objective.CYCLE:
+                if not is_estimate:
                     break
         best = min(passed, key=lambda result: (result.cycle, result.trial), default=None)
-        if best is not None and self.ready.phases is not None and self.request.objective is Objective.CYCLE:
+        if best is not None and is_estimate:
             self.tried[best.trial] = best = self.finish.learned(best)
         return best
 

@@ -47,11 +47,12 @@ class CellDistances:
     Attributes:
         pairs: The pairs: those that the checks watch, those of which they judge the depth, then areas of the floor with
             the bases and columns that keep out of them.
+        variables: What places the bodies.
     """
 
     def __init__(self, scene: Scene, variables: LayoutVariables) -> None:
         """Use ``of``."""
-        self._scene, self._variables, self._cell = scene, variables, scene.cell
+        self._scene, self.variables, self._cell = scene, variables, scene.cell
         self._moving = MovingBodies(scene)
         self.pairs, watched = layout_pairs(scene)
         areas, origins = keep_out_bodies(scene.cell)
@@ -101,7 +102,7 @@ class CellDistances:
     def of_variables(self, variables: LayoutVariables) -> "CellDistances":
         """The same pairs for other variables that change the same bodies."""
         distances = copy(self)
-        distances._variables = variables
+        distances.variables = variables
         return distances
 
     def near(self, x: Array, q: Array, within: float) -> NearPairs:
@@ -112,7 +113,7 @@ class CellDistances:
             q: Stacked joint positions at the keys in [rad] or [m], shape (K, nq).
             within: The distance in [m].
         """
-        cell = self._variables.placed(x)
+        cell = self.variables.placed(x)
         table, engine = self._placed(cell)
         D = table.forest.displacements(q, _bases(cell))
         return table.find(engine, D, within)
@@ -124,7 +125,7 @@ class CellDistances:
             x: The variables, shape (n,).
             dq: Derivatives of the joints at the keys by the variables, shape (K, nq, n).
         """
-        derivatives, base = np.empty((len(near.rows), dq.shape[2])), self._variables.base_twists(x)
+        derivatives, base = np.empty((len(near.rows), dq.shape[2])), self.variables.base_twists(x)
         for key in range(len(dq)):
             rows = near.samples == key
             derivatives[rows] = near.by_joints[rows] @ dq[key]
@@ -196,7 +197,7 @@ class CellDistances:
             for component in np.flatnonzero(by.any(axis=1)).tolist():
                 forward, back = (self._column(name, _displaced(X_WB, component, step)) for step in (STEP, -STEP))
                 yield index, by[component], forward, back
-        for neighbour in self._variables.neighbours(x, STEP):
+        for neighbour in self.variables.neighbours(x, STEP):
             moved = (self._moving.that_differ(cell, neighbour.robot) for cell in neighbour.sides)
             for (index, forward), (_, back) in zip(*moved, strict=True):
                 if forward.shape != back.shape or not np.array_equal(forward.X_LS, back.X_LS):

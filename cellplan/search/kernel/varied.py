@@ -1,6 +1,7 @@
 """Varied: what every part of a search asks of its variables."""
 
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import Final, Protocol
 
 from cellplan.geometry.arrays import Array
 from cellplan.search.kernel.job import Layouts
@@ -43,3 +44,18 @@ class KernelVariables(Varied, Protocol):
 
     def directions(self, x: Array) -> Directions:
         """What each variable does to a candidate, at values of shape (n,)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class VariedFields:
+    """What variables work out when they are made; see ``Varied``."""
+
+    names: tuple[str, ...] = field(init=False)
+    lower: Array = field(init=False)
+    upper: Array = field(init=False)
+    scale: Array = field(init=False)
+    cost: Array = field(init=False)
+    given: Array = field(init=False)
+
+
+VARIED: Final = tuple(VariedFields.__dataclass_fields__)

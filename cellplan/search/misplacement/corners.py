@@ -6,11 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.search.kernel.run import run
-from cellplan.search.misplacement.guarded import GuardedProblem
+from cellplan.search.misplacement.guarded import Guarded
 from cellplan.search.programs.measures import Measures
-from cellplan.search.programs.objective import Demands, Effort
-from cellplan.search.programs.problem import Point
+from cellplan.search.programs.objective import Demands, Effort, Objective
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,48 +34,45 @@ class Corner:
         return self.cycle <= cycle and bool(np.all(self.margins >= 0.0)) and self.spare_distance >= 0.0
 
 
-def judged(problem: GuardedProblem, d: Array, start: Array, demands: Demands, effort: Effort) -> list[Corner]:
+def judged(problem: Guarded, d: Array, start: Array, demands: Demands, effort: Effort) -> list[Corner]:
     """Motions of a layout with displaced bases, planned anew, all together.
 
     Args:
         d: The displacements, shape (K, m).
         start: Start posture of the layout, near theirs, shape (nq,).
     """
-    motions = run(problem.job, problem.variables.layouts(d, np.tile(start, (len(d), 1))))
     corners = []
-    for place, is_followed in enumerate(motions.is_followed.tolist()):
-        if not is_followed:
+    for place, point in enumerate(problem.points(d, start)):
+        if point is None:
             corners.append(_lost(problem, d[place], start))
-            continue
-        q, qd = motions.q[place], motions.qd[place]
-        point = Point(x=d[place], start=q[0], q=q, qd=qd, qdd=problem.job.rates @ qd)
-        corners.append(_measured(problem, Measures.of(problem, point, demands, effort)))
+        else:
+            corners.append(_measured(problem, Measures.of(problem, point, demands, effort), demands))
     return corners
 
 
-def _lost(problem: GuardedProblem, d: Array, start: Array) -> Corner:
+def _lost(problem: Guarded, d: Array, start: Array) -> Corner:
     """A layout in which a tool cannot follow."""
-    margins, spare = np.full(len(start), -np.inf), np.full(problem.pair_count, -np.inf)
+    margins, spare = np.full(len(problem.limits.velocity), -np.inf), np.full(len(problem.is_arm), -np.inf)
     return Corner(d=d, start=start, cycle=np.inf, margins=margins, spare_distances=spare, first="a tool loses its path")
 
 
-def _measured(problem: GuardedProblem, measures: Measures) -> Corner:
-    """A layout whose motion is known."""
-    spare = np.full(problem.pair_count, np.inf)
+def _measured(problem: Guarded, measures: Measures, demands: Demands) -> Corner:
+    """A layout whose motion is known; its cycle is that of the motions alone where that is not the objective."""
+    spare, is_whole = np.full(len(problem.is_arm), np.inf), demands.objective is Objective.CYCLE
     np.minimum.at(spare, measures.distances.pairs, -measures.violations)
     beyond = np.maximum(measures.lower.value.max(axis=0), measures.upper.value.max(axis=0))
     point = measures.point
     return Corner(
         d=point.x,
         start=point.start,
-        cycle=measures.cycle,
+        cycle=measures.cycle if is_whole else measures.factor * measures.span,
         margins=-beyond,
         spare_distances=spare,
         first=_first(problem, measures, beyond, spare),
     )
 
 
-def _first(problem: GuardedProblem, measures: Measures, beyond: Array, spare: Array) -> str:
+def _first(problem: Guarded, measures: Measures, beyond: Array, spare: Array) -> str:
     """What is missed most, of margins and distances; else the joint that decides the cycle."""
     scores: Sequence[float] = (float(beyond.max()) / np.radians(1.0), -float(spare.min(initial=np.inf)) / 0.01)
     if max(scores) <= 0.0:

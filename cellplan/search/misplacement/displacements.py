@@ -1,6 +1,6 @@
 """Displacements of the bases of one layout as variables, so that the kernel and the bodies give their derivatives."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from cellplan.model.settings.layout import MisplacementEntry
 from cellplan.search.distances.moving_bodies import NeighbourCells
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
+from cellplan.search.kernel.varied import VariedFields
 from cellplan.search.variables.variables import Variables
 from cellplan.search.variables.written import written_quantity
 
@@ -24,7 +25,7 @@ ON_PLANE: Final = 1e-6  # [m] by which a base may be off a plane and stand on it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BaseDisplacements:
+class BaseDisplacements(VariedFields):
     """Variables d, m of them: how far each base is beside its place in a layout, 0 for the layout itself.
 
     A base is displaced along the axes of the world in [m] and turned about the vertical through its origin in [rad]; a
@@ -37,12 +38,6 @@ class BaseDisplacements:
     robots: tuple[int, ...]  # the robot of each displacement, m of them
     components: tuple[int, ...]  # its place in ``COMPONENTS``, m of them
     amounts: Array  # by how much each base may be off, shape (m,)
-    names: tuple[str, ...] = field(init=False)  # address that each changes
-    given: Array = field(init=False)  # no displacement, shape (m,)
-    lower: Array = field(init=False)  # lowest values, shape (m,)
-    upper: Array = field(init=False)  # highest values, shape (m,)
-    scale: Array = field(init=False)  # usual steps, shape (m,)
-    cost: Array = field(init=False)  # costs of a change, shape (m,)
 
     def __post_init__(self) -> None:
         """Name the displacements by the addresses that they change, and derive their bounds and steps."""
@@ -120,10 +115,9 @@ class BaseDisplacements:
         robots = tuple(replace(robot, X_WB=X) for robot, X in zip(cell.robots, X_WB, strict=True))
         return replace(cell, robots=robots)
 
-    def cell(self, d: Array, start: Array) -> Cell:
-        """The cell of the file with displaced bases, shape (m,), and a start posture, (nq,); see ``Variables``."""
-        values = self.variables.values(self.x, start)
-        bases = self.variables.state(self.x).bases
+    def cell(self, d: Array, values: dict[str, object]) -> Cell:
+        """The cell of the file with displaced bases, shape (m,), and the values of a layout and its start."""
+        values, bases = dict(values), self.variables.state(self.x).bases
         for name, robot, component, by in zip(self.names, self.robots, self.components, d.tolist(), strict=True):
             value = bases[robot, TWIST_ROWS[component]] + by
             values[name] = written_quantity(float(value), is_angle=component > HEIGHT)

@@ -6,18 +6,20 @@ direction, linearly with the joints, and what is left to the fold falls with :ma
 sigma to first order, the motion exists as long as :math:`R \le \sigma / 2`, and :math:`R \sigma` stays the same.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from typing import Final, Self
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array, Indices
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.frozen import derive
-from cellplan.search.distances.cell_distances import CellDistances
+from cellplan.search.kernel.run import run
 from cellplan.search.kernel.singular_values import SingularValues, arms
-from cellplan.search.kernel.varied import KernelVariables
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
+from cellplan.search.programs.program_problem import ProgramProblem
+from cellplan.search.variables.phase_variables import ProgramVariables, in_place_of
 
 LENGTH: Final = 0.3  # [m] that a singular value of 1 counts as among the distances
 FOLDS: Final = 4.0  # [-] times the first-order change that is kept: 2 is the fold itself
@@ -48,25 +50,29 @@ class GuardedProblem(LayoutProblem):
         derive(self, guards=np.array(redundant, dtype=np.intp))
 
     @classmethod
-    def like(
-        cls,
-        problem: LayoutProblem,
-        *,
-        variables: KernelVariables | None = None,
-        bodies: CellDistances | None = None,
-    ) -> Self:
-        """The same problem, guarded, perhaps with other variables."""
+    def like(cls, problem: LayoutProblem) -> Self:
+        """The same problem, guarded."""
         return cls(
-            job=problem.job,
-            variables=variables or problem.variables,
-            bodies=bodies or problem.bodies,
-            acceleration=problem.acceleration,
+            job=problem.job, variables=problem.variables, bodies=problem.bodies, acceleration=problem.acceleration
         )
 
+    def of_variables(self, variables: ProgramVariables) -> "GuardedProblem":
+        """The same problem with other variables that change the same bodies."""
+        others = in_place_of(self.variables, variables)
+        return replace(GuardedProblem.like(self), variables=others, bodies=self.bodies.of_variables(others))
+
     @property
-    def pair_count(self) -> int:
-        """Number of pairs, arms among them."""
-        return len(self.bodies.pairs) + len(self.guards)
+    def is_arm(self) -> Flags:
+        """Which pairs are arms, shape (pairs,)."""
+        return np.arange(len(self.bodies.pairs) + len(self.guards)) >= len(self.bodies.pairs)
+
+    def points(self, x: Array, start: Array) -> list[Point | None]:
+        """Motions at several values of the variables, shape (K, n), near one start posture; see ``evaluate``."""
+        motions = run(self.job, self.variables.layouts(x, np.tile(start, (len(x), 1))))
+        points = list[Point | None]()
+        for values, q, qd, is_followed in zip(x, motions.q, motions.qd, motions.is_followed.tolist(), strict=True):
+            points.append(Point(x=values, start=q[0], q=q, qd=qd, qdd=self.job.rates @ qd) if is_followed else None)
+        return points
 
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
         """See ``Problem``."""
@@ -103,7 +109,56 @@ class GuardedProblem(LayoutProblem):
         relation = self.job.relations[arms(self.job)[self.guards[place]]]
         return relation.robot, "a singular configuration"
 
-    def away_from_fold(self, taken: Array, values: Array, pairs: Indices) -> Array:
-        """What rows ask for: what displacements take, shape (M,), of arms enough to keep off the fold."""
-        is_arm = pairs >= len(self.bodies.pairs)
-        return np.where(is_arm, np.sqrt(FOLDS * taken * np.maximum(values, 0.0)), taken)
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GuardedProgram(ProgramProblem):
+    """A program whose phases are guarded; they share no pairs."""
+
+    phases: tuple[GuardedProblem, ...]
+
+    def of_variables(self, variables: ProgramVariables) -> "GuardedProgram":
+        """See ``GuardedProblem``."""
+        phases = tuple(phase.of_variables(variables) for phase in self.phases)
+        return replace(self, phases=phases, transfers=self.transfers.of_variables(variables))
+
+    @property
+    def is_arm(self) -> Flags:
+        """See ``GuardedProblem``."""
+        return np.concatenate([phase.is_arm for phase in self.phases])
+
+    def points(self, x: Array, start: Array) -> list[Point | None]:
+        """See ``GuardedProblem``."""
+        starts = start.reshape(len(self.phases), -1)
+        of_phases = [phase.points(x, begin) for phase, begin in zip(self.phases, starts, strict=True)]
+        points = list[Point | None]()
+        for values, *parts in zip(x, *of_phases, strict=True):
+            followed = [part for part in parts if part is not None]
+            points.append(self._joined(values, followed) if len(followed) == len(parts) else None)
+        return points
+
+    @property
+    def _first_pairs(self) -> list[int]:
+        """See ``ProgramProblem``."""
+        return list(accumulate((len(phase.is_arm) for phase in self.phases[:-1]), initial=0))
+
+
+Guarded = GuardedProblem | GuardedProgram
+
+
+def guarded(problem: object) -> Guarded:
+    """The same problem with its arms kept away from singular configurations.
+
+    Raises:
+        TypeError: The positioner has a joint path.
+    """
+    if isinstance(problem, ProgramProblem):
+        phases = tuple(GuardedProblem.like(phase) for phase in problem.phases)
+        return GuardedProgram(phases=phases, transfers=problem.transfers, homes=problem.homes)
+    if isinstance(problem, LayoutProblem):
+        return GuardedProblem.like(problem)
+    raise TypeError("displaced bases: expected motions by the pseudo-inverse, got a joint path")
+
+
+def away_from_fold(problem: Guarded, taken: Array, values: Array, pairs: Indices) -> Array:
+    """What rows ask for: what displacements take, shape (M,), of arms enough to keep off the fold."""
+    return np.where(problem.is_arm[pairs], np.sqrt(FOLDS * taken * np.maximum(values, 0.0)), taken)

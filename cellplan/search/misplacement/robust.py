@@ -16,16 +16,18 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.frozen import derive
 from cellplan.search.kernel.derivatives import differentiate
+from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.run import run, run_near
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.misplacement.corners import Corner, judged
 from cellplan.search.misplacement.displacements import BaseDisplacements
-from cellplan.search.misplacement.guarded import GuardedProblem
+from cellplan.search.misplacement.guarded import Guarded, GuardedProblem, GuardedProgram
 from cellplan.search.misplacement.worst import Worst, worst
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point, PointDerivatives
+from cellplan.search.variables.phase_variables import in_place_of
 
 SEEDED: Final = 128  # [-] corners
 ROUNDS: Final = 5  # [-] of programs and corners
@@ -50,7 +52,7 @@ class Robust:
     ends: int  # number of displacements at their ends, one at a time
     nominal: float  # shortest cycle in [s] of the layout in place
     cycle: float  # shortest cycle in [s] in which the layout and all its corners keep their limits
-    problem: GuardedProblem  # the job, with the displacements as its variables
+    problem: Guarded  # the job, with the displacements as its variables
     displacements: BaseDisplacements  # base displacements of this layout
 
     @property
@@ -68,7 +70,7 @@ class Robust:
 class RobustSearch:
     """Rounds of programs with scenarios."""
 
-    problem: GuardedProblem  # the layout problem
+    problem: Guarded  # the layout problem
     displacements: BaseDisplacements  # displacements of the bases of any of its layouts
     demands: Demands  # the objective and what must be kept in every corner
     effort: Effort  # how much work each round may do
@@ -77,13 +79,12 @@ class RobustSearch:
 
     def __post_init__(self) -> None:
         """Begin without scenarios, and with nothing that corners were seen to miss."""
-        self._beyond = np.zeros(self.problem.pair_count)
+        self._beyond = np.zeros(len(self.problem.is_arm))
         self.demands = replace(self.demands, singular=None)  # the problem guards its arms itself
 
-    def displaced(self, x: Array) -> GuardedProblem:
+    def displaced(self, x: Array) -> Guarded:
         """The job of a layout, shape (n,), with the displacements of its bases as variables."""
-        of = self.displacements.at(x)
-        return GuardedProblem.like(self.problem, variables=of, bodies=self.problem.bodies.of_variables(of))
+        return self.problem.of_variables(self.displacements.at(x))
 
     def once(self, x: Array, start: Array) -> Improved | None:
         """One round from a layout, shape (n,), and its start posture, shape (nq,); None without a motion."""
@@ -95,15 +96,15 @@ class RobustSearch:
         if not self._scenarios:
             self._begin(of, worst_case, point.start)
         demands = replace(self.demands, beyond=worst_case.distances + self._beyond)
-        scenarios = ScenarioProblem.of(self.problem, self.displacements, np.array(self._scenarios))
+        scenarios = scenarios_of(self.problem, self.displacements, np.array(self._scenarios))
         improved = improve(scenarios, x, point.start, demands, self.effort)
         if improved is None and len(self._scenarios) > 1:  # one is out of reach by now
             del self._scenarios[1:]
-            self._beyond[len(self.problem.bodies.pairs) :] += MORE_REACH
+            self._beyond[self.problem.is_arm] += MORE_REACH
             return self.once(x, start)
         return improved
 
-    def finer(self, problem: GuardedProblem, robust: Robust, effort: Effort) -> "RobustSearch":
+    def finer(self, problem: Guarded, robust: Robust, effort: Effort) -> "RobustSearch":
         """The same search on more nodes, with the scenarios of a layout that are near their limits."""
         near = [
             corner.d
@@ -145,7 +146,7 @@ class RobustSearch:
         corners = robust.corners
         followed = [corner for corner in corners if np.isfinite(corner.cycle)]
         if len(followed) < len(corners):  # only further from singular configurations helps
-            self._beyond[len(self.problem.bodies.pairs) :] += MORE_REACH
+            self._beyond[self.problem.is_arm] += MORE_REACH
         violations = -np.min([corner.spare_distances for corner in followed], axis=0) if followed else np.zeros(0)
         if (violations > 0.0).any():
             self._beyond += np.where(violations > 0.0, np.minimum(violations, MOST_LENGTH) + MORE_LENGTH, 0.0)
@@ -155,7 +156,7 @@ class RobustSearch:
         added = self._add(sorted(followed, key=lambda scenario: -_missed(scenario, most)), most)
         return added or len(followed) < len(corners) or bool((violations > 0.0).any())
 
-    def _begin(self, of: GuardedProblem, worst_case: Worst, start: Array) -> None:
+    def _begin(self, of: Guarded, worst_case: Worst, start: Array) -> None:
         """Take the layout in place and the worst corners as scenarios, as far as tools can follow there."""
         planned = judged(of, worst_case.corners, start, self.demands, replace(self.effort, keys=1, within=0.0))
         self._scenarios = [of.given, *(scenario.d for scenario in planned if np.isfinite(scenario.cycle))]
@@ -207,8 +208,16 @@ def _missed(corner: Corner, most: float) -> float:
 
 def _rank(robust: Robust, demands: Demands) -> tuple[bool, int, float]:
     """Sort key, best first."""
-    is_late = demands.duration is not None and robust.cycle > demands.duration
+    is_late = demands.objective is not Objective.CYCLE and robust.cycle > (demands.duration or np.inf)
     return is_late or not robust.is_met, len(robust.corners) - robust.passing, robust.cycle
+
+
+def scenarios_of(problem: Guarded, displacements: BaseDisplacements, d: Array) -> "GuardedProgram | ScenarioProblem":
+    """The motions of a problem with displacements of shape (S, m), one after the other; of a program in each phase."""
+    if isinstance(problem, GuardedProblem):
+        return ScenarioProblem.of(problem, displacements, d)
+    phases = tuple(ScenarioProblem.of(phase, displacements, d) for phase in problem.phases)
+    return replace(problem, phases=phases, transfers=problem.transfers.repeated(len(d)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -233,21 +242,26 @@ class ScenarioProblem(GuardedProblem):
         """Scenarios of a layout problem, with displacements of shape (S, m)."""
         return cls(
             job=problem.job,
-            variables=displacements.variables,
+            variables=problem.variables,
             bodies=problem.bodies,
             acceleration=problem.acceleration,
             displacements=displacements,
             d=d,
         )
 
+    def _layouts(self, x: Array, start: Array) -> Layouts:
+        """The displaced layouts, with start postures of shape (S, nq)."""
+        return in_place_of(self.variables, self.displacements.at(x)).layouts(self.d, start)
+
     def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:
         """See ``Problem``; the start posture is that of the layout in place."""
         count = len(self.d)
         if near is None:
-            motion = run(self.job, self.displacements.at(x).layouts(self.d, np.tile(start, (count, 1))))
+            motion = run(self.job, self._layouts(x, np.tile(start, (count, 1))))
         else:
             q = near.q.reshape(count, -1, near.q.shape[1])
-            motion = run_near(self.job, self.displacements.at(x).layouts(self.d, q[:, 0]), q, near.rates)
+            rates = None if near.rates is None else near.rates[: len(self.job.times)]
+            motion = run_near(self.job, self._layouts(x, q[:, 0]), q, rates)
         if not motion.is_followed.all():
             return None
         all_q, all_qd = (np.ascontiguousarray(part).reshape(-1, len(start)) for part in (motion.q, motion.qd))
@@ -262,7 +276,7 @@ class ScenarioProblem(GuardedProblem):
         """See ``Problem``; rates are those of the layout in place."""
         count, nq = len(self.d), point.q.shape[1]
         q, qd = (part.reshape(count, -1, nq) for part in (point.q, point.qd))
-        layouts = self.displacements.at(point.x).layouts(self.d, q[:, 0])
+        layouts = self._layouts(point.x, q[:, 0])
         directions = self.variables.directions(point.x)
         derivatives = [
             differentiate(self.job, layouts.of_places(slice(place, place + 1)), q[place], qd[place], directions)
@@ -275,4 +289,7 @@ class ScenarioProblem(GuardedProblem):
         qdd = None
         if self.is_accelerating:
             qdd = (self.job.rates @ by_qd.reshape(count, q.shape[1], -1)).reshape(by_qd.shape)
-        return PointDerivatives(q=by_q, qd=by_qd, qdd=qdd, rates=derivatives[0].rates)
+        rates = derivatives[0].rates
+        return PointDerivatives(
+            q=by_q, qd=by_qd, qdd=qdd, rates=None if rates is None else np.tile(rates, (count, 1, 1))
+        )

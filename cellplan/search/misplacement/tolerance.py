@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.search.misplacement.corners import judged
-from cellplan.search.misplacement.guarded import GuardedProblem
+from cellplan.search.misplacement.guarded import Guarded
 from cellplan.search.programs.objective import Demands, Effort
 
 FARTHEST: Final = 16.0  # [-] times the amount that is asked for
@@ -28,7 +28,7 @@ class BaseTolerance:
 
 
 def tolerances(
-    problem: GuardedProblem, start: Array, demands: Demands, effort: Effort, cycle: float
+    problem: Guarded, start: Array, demands: Demands, effort: Effort, cycle: float
 ) -> tuple[BaseTolerance, ...]:
     """How far each base may be off in every direction, by bisection of all of them together.
 

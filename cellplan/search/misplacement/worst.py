@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.search.misplacement.guarded import GuardedProblem
+from cellplan.search.misplacement.guarded import Guarded, away_from_fold
 from cellplan.search.programs.measures import Measures
 from cellplan.search.programs.objective import Demands, Effort
 from cellplan.search.programs.problem import Point, PointDerivatives
@@ -31,7 +31,7 @@ class Worst:
     corners: Array  # the displacements that do it for what comes nearest to its limit, shape (K, m)
 
 
-def worst(problem: GuardedProblem, point: Point, demands: Demands, effort: Effort) -> Worst:
+def worst(problem: Guarded, point: Point, demands: Demands, effort: Effort) -> Worst:
     """The worst displacements of a layout."""
     amounts, by = problem.upper, problem.derivatives(point)
     measures = Measures.of(problem, point, demands, effort)
@@ -39,7 +39,7 @@ def worst(problem: GuardedProblem, point: Point, demands: Demands, effort: Effor
     q, qd = (np.abs(part) @ amounts for part in (by.q, by.qd))
     qdd = np.zeros_like(qd) if by.qdd is None else np.abs(by.qdd) @ amounts
     rows = measures.distances
-    taken = problem.away_from_fold(np.abs(apart) @ amounts, rows.values, rows.pairs)
+    taken = away_from_fold(problem, np.abs(apart) @ amounts, rows.values, rows.pairs)
     worst_case = Worst(
         margins=q,
         speeds=qd / problem.limits.velocity,
@@ -52,15 +52,15 @@ def worst(problem: GuardedProblem, point: Point, demands: Demands, effort: Effor
     return replace(worst_case, corners=corners * amounts)
 
 
-def _of_pairs(problem: GuardedProblem, measures: Measures, taken: Array) -> Array:
+def _of_pairs(problem: Guarded, measures: Measures, taken: Array) -> Array:
     """What is taken from each pair where that leaves least; from pairs that are not near the median of the others."""
-    distances, rows = np.full(problem.pair_count, np.median(taken) if len(taken) else 0.0), measures.distances
+    distances, rows = np.full(len(problem.is_arm), np.median(taken) if len(taken) else 0.0), measures.distances
     for row in np.argsort(measures.violations + taken, kind="stable").tolist():
         distances[rows.pairs[row]] = taken[row]
     return distances
 
 
-def _of_joints(problem: GuardedProblem, measures: Measures, by: PointDerivatives, worst_case: Worst) -> Iterator[Array]:
+def _of_joints(problem: Guarded, measures: Measures, by: PointDerivatives, worst_case: Worst) -> Iterator[Array]:
     """Signs of the displacements that take most from margins, speeds and accelerations."""
     point = measures.point
     units = np.where(problem.limits.is_revolute, np.radians(1.0), 0.01)

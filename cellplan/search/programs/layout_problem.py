@@ -16,8 +16,8 @@ from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.job import Job, enough_nodes
 from cellplan.search.kernel.run import run, run_near
 from cellplan.search.kernel.singular_values import SingularValues
-from cellplan.search.kernel.varied import KernelVariables
-from cellplan.search.programs.problem import VARIED, Distances, Point, PointDerivatives, ProblemFields
+from cellplan.search.kernel.varied import VARIED, KernelVariables
+from cellplan.search.programs.problem import Distances, Point, PointDerivatives, ProblemFields
 from cellplan.search.programs.transfers import Transfers
 
 

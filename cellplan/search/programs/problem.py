@@ -1,11 +1,11 @@
 """Problem: what sequential programs know of what they improve; a whole layout, the path of a positioner, or both."""
 
 from dataclasses import dataclass, field
-from typing import Final, Protocol
+from typing import Protocol
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.robot.robot import JointLimits
-from cellplan.search.kernel.varied import Varied
+from cellplan.search.kernel.varied import Varied, VariedFields
 from cellplan.search.programs.transfers import Transfers
 
 
@@ -114,19 +114,10 @@ class Problem(Varied, Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ProblemFields:
+class ProblemFields(VariedFields):
     """What every problem works out when it is made; see ``Problem``."""
 
-    names: tuple[str, ...] = field(init=False)
-    lower: Array = field(init=False)
-    upper: Array = field(init=False)
-    scale: Array = field(init=False)
-    cost: Array = field(init=False)
-    given: Array = field(init=False)
     times: Array = field(init=False)
     limits: JointLimits = field(init=False)
     transfers: Transfers = field(init=False)
     is_dense: bool = field(init=False, default=False)
-
-
-VARIED: Final = ("names", "lower", "upper", "scale", "cost", "given")  # those that are of the variables

@@ -3,15 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.frozen import derive
 from cellplan.search.kernel.singular_values import SingularValues
+from cellplan.search.kernel.varied import VARIED
 from cellplan.search.programs.layout_problem import LayoutProblem
-from cellplan.search.programs.problem import VARIED, Distances, Point, PointDerivatives, ProblemFields
+from cellplan.search.programs.problem import Distances, Point, PointDerivatives, ProblemFields
 from cellplan.search.programs.transfers import HOME, Transfers
 
 FAR_FROM_SINGULAR: Final = 1e6  # [m] and [rad] in place of singular values of arms that are not at work
@@ -41,6 +42,10 @@ class ProgramProblem(ProblemFields):
             if point is None:
                 return None
             points.append(point)
+        return self._joined(x, points)
+
+    def _joined(self, x: Array, points: Sequence[Point]) -> Point:
+        """The point whose phases have some motions."""
         motion = _stacked(points, "q", "qd", "qdd")
         q = self._at_homes(motion["q"])
         return Point(x=x, start=q[[part.start for part in self.transfers.parts]].ravel(), **{**motion, "q": q})
@@ -62,8 +67,8 @@ class ProgramProblem(ProblemFields):
 
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
         """See ``Problem``; a tool and the part that it works on may touch: of them the task sets the distance."""
-        all_near = list[Distances]()
-        for place, (phase, rows) in enumerate(zip(self.phases, self.transfers.parts, strict=True)):
+        all_near, parts = list[Distances](), self.transfers.parts
+        for place, (phase, rows) in enumerate(zip(self.phases, parts, strict=True)):
             chosen = nodes[(nodes >= rows.start) & (nodes < rows.stop)] - rows.start
             near = phase.distances(self._of_phase(point, place), chosen, within)
             may_touch = (near.demands <= 0.0) & (phase.bodies.most_demanded > 0.0)
@@ -72,18 +77,16 @@ class ProgramProblem(ProblemFields):
         return Distances(
             **_stacked(all_near, "nodes", "values", "demands", "within_robot"),
             pairs=np.concatenate(firsts),
-            detail=[near.detail for near in all_near],
+            detail=[replace(near, nodes=near.nodes - rows.start) for near, rows in zip(all_near, parts, strict=True)],
         )
 
     def distance_derivatives(self, point: Point, distances: Distances, by_joints: PointDerivatives) -> Array:
         """See ``Problem``."""
-        details: Any = distances.detail
-        return np.concatenate(
-            [
-                phase.bodies.derivatives(pairs.near, point.x, by_joints.q[rows][pairs.nodes])
-                for phase, rows, pairs in zip(self.phases, self.transfers.parts, details, strict=True)
-            ]
-        )
+        near, derivatives = cast("list[Distances]", distances.detail), list[Array]()
+        for place, (phase, rows) in enumerate(zip(self.phases, self.transfers.parts, strict=True)):
+            by_phase = PointDerivatives(q=by_joints.q[rows], qd=by_joints.qd[rows], qdd=None)
+            derivatives.append(phase.distance_derivatives(self._of_phase(point, place), near[place], by_phase))
+        return np.concatenate(derivatives)
 
     def arms(self, point: Point) -> "ProgramArms":
         """See ``Problem``."""

@@ -20,6 +20,7 @@ from cellplan.geometry.arrays import Array, Indices
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.planning.transfer.straight_time import box_widths
 from cellplan.search.distances.cell_distances import CellDistances
+from cellplan.search.variables.phase_variables import ProgramVariables, in_place_of
 
 NORM: Final = 24.0  # [-] p: six joints as slow as each other take 8 % more
 SHORTEST: Final = 1e-9  # [rad] or [m] of a move: what is shorter stands still
@@ -51,6 +52,19 @@ class Transfers:
         bounds = JointLimitsInTime(velocity=nothing, acceleration=nothing, jerk=nothing)
         ends, parts = np.zeros((2, 0, joints), dtype=np.intp), (slice(0, nodes),)
         return cls(parts=parts, ends=ends, home=nothing, bounds=bounds, step=1.0, bodies=(), detours=np.zeros(0))
+
+    def repeated(self, count: int) -> Self:
+        """The same with the nodes of each motion so many times one after the other, of which the first ones count."""
+        parts, ends = [], self.ends.copy()
+        for part in self.parts:
+            parts.append(slice(count * part.start, count * part.stop))
+            ends[(self.ends >= part.start) & (self.ends < part.stop)] += (count - 1) * part.start
+        return replace(self, parts=tuple(parts), ends=ends)
+
+    def of_variables(self, variables: ProgramVariables) -> Self:
+        """The same for other variables of the program; see ``CellDistances``."""
+        bodies = [one.of_variables(in_place_of(one.variables, variables)) for one in self.bodies]
+        return replace(self, bodies=tuple(bodies))
 
     def seconds(self, x: Array, q: Array) -> float:
         """Time of them all in [s], for variables of shape (n,) and joint positions at the nodes, shape (N, nq)."""

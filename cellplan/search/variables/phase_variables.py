@@ -1,37 +1,35 @@
 """The variables of a program as one of its phases has them: other starts, and the part where it lies."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.frozen import derive
 from cellplan.model.cell.cell import Cell, Part
-from cellplan.search.distances.moving_bodies import NeighbourCells
+from cellplan.search.distances.moving_bodies import LayoutVariables, NeighbourCells
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
-from cellplan.search.variables.variables import Variables
+from cellplan.search.kernel.varied import VARIED, KernelVariables, VariedFields
+
+
+class ProgramVariables(KernelVariables, LayoutVariables, Protocol):
+    """Variables of a whole program."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PhaseVariables:
+class PhaseVariables(VariedFields):
     """The variables of a program in one of its phases."""
 
-    whole: Variables  # the variables of the program
+    whole: ProgramVariables  # the variables of the program
     begins_there: bool  # whether it begins where variables of the start say
     lying: Part | None = None  # the part where it lies in the cell
-    names: tuple[str, ...] = field(init=False)
-    lower: Array = field(init=False)
-    upper: Array = field(init=False)
-    scale: Array = field(init=False)
-    cost: Array = field(init=False)
-    given: Array = field(init=False)
 
     def __post_init__(self) -> None:
         """Note what the variables of the program know."""
-        names = ("names", "lower", "upper", "scale", "cost", "given")
-        derive(self, **{name: getattr(self.whole, name) for name in names})
+        derive(self, **{name: getattr(self.whole, name) for name in VARIED})
 
     def layouts(self, x: Array, start: Array) -> Layouts:
         """See ``KernelVariables``."""
@@ -55,3 +53,8 @@ class PhaseVariables:
     def neighbours(self, x: Array, step: float) -> Iterable[NeighbourCells]:
         """See ``LayoutVariables``; a part that lies does not move."""
         return (it for it in self.whole.neighbours(x, step) if self.lying is None or it.robot is not None)
+
+
+def in_place_of(variables: object, whole: ProgramVariables) -> ProgramVariables:
+    """Other variables of a program in place of these, as the phase has them that these belong to."""
+    return replace(variables, whole=whole) if isinstance(variables, PhaseVariables) else whole

@@ -1,8 +1,10 @@
 """A search of a program from end to end, and what is refused of programs."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
+from builders.home_to_home import PICK_AND_PLACE
 from builders.study_trials import InThisProcess
 
 from cellplan import LayoutRequest, Stop, load_cell, search_layout, solve
@@ -45,6 +47,30 @@ def test_a_program_as_it_is_written_gets_shorter_transfers(tmp_path: Path) -> No
     assert [phase.report.cycle_time for phase in works] == pytest.approx([3.0] * 3)
 
 
+@pytest.mark.slow
+def test_a_program_keeps_its_demands_with_misplaced_bases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cellplan.jobs.layout.finish.misplacement.OF_PROGRAM", 2)
+    monkeypatch.setattr("cellplan.search.misplacement.worst.MOST", 1)
+    path = tmp_path / "cell.yaml"
+    path.write_text(PICK_AND_PLACE)
+    request = LayoutRequest(cell=path, objective=Objective.CONFORMING, misplacement=(2.0, 0.2))
+
+    result = search_layout(request, tmp_path / "study", stop=Stop(trials=1), workers=InThisProcess())
+
+    record = result.record["misplacement"]
+    assert record is not None
+    assert (record["seeded_kept"], record["ends_kept"]) == (2, 14)
+    assert record["by_derivatives_kept"] == record["by_derivatives"] > 0
+    best = load_cell(tmp_path / "study" / "best.yaml")
+    limit = next(it for it in record["tolerances"] if (it["robot"], it["direction"]) == ("pen", "x"))
+    assert limit["plus"] >= 2.0
+    for sign in (1.0, -1.0):  # transfers and homes are planned with the displaced base too
+        x = 1e3 * float(best.robot("pen").X_WB[0, 3]) + 2.0 * sign
+        displaced = solve(best.with_values({"robots.pen.base.x_mm": x}))
+        assert displaced.passed
+        assert displaced.motion.times[-1] <= record["cycle_s"] + 1e-9
+
+
 def _refusal(**changes: object) -> str:
     with pytest.raises(InputError) as caught:
         searched_cell(LayoutRequest(cell=CELL, **changes))
@@ -52,7 +78,6 @@ def _refusal(**changes: object) -> str:
 
 
 def test_what_a_search_cannot_change_in_a_program_is_one_line() -> None:
-    assert "--misplacement: expected no misplaced bases with a program" in _refusal(misplacement=(1.0, 1.0))
     assert "expected a task of a robot that has no other" in _refusal(free=("spin",))
     assert "got robots.holder.path; leave it out" in _refusal(free=("path",))
     assert "got tasks.left_seam.robot; leave it out" in _refusal(vary=("tasks.left_seam.robot=[left, right]",))
@@ -60,5 +85,11 @@ def test_what_a_search_cannot_change_in_a_program_is_one_line() -> None:
 
 
 def test_programs_may_be_retimed_and_may_only_have_to_conform() -> None:
-    for changes in ({"timing": CycleTiming.RETIMED}, {"objective": Objective.CONFORMING}, {"free": ("start",)}):
+    several: tuple[dict[str, Any], ...] = (
+        {"timing": CycleTiming.RETIMED},
+        {"objective": Objective.CONFORMING},
+        {"free": ("start",)},
+        {"misplacement": (1.0, 1.0)},
+    )
+    for changes in several:
         assert searched_cell(LayoutRequest(cell=CELL, **changes)).program.is_home_to_home

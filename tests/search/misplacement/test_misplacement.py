@@ -9,13 +9,13 @@ import pytest
 
 from cellplan import load_cell, solve
 from cellplan.jobs.layout.request import LayoutRequest
-from cellplan.jobs.layout.trials.prepared import PreparedSearch
+from cellplan.jobs.layout.trials.prepared import PreparedSearch, values_of
 from cellplan.jobs.layout.trials.searched import searched_cell
+from cellplan.model.cell.cell import Cell
 from cellplan.model.settings.layout import MisplacementEntry
-from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.misplacement.corners import judged
 from cellplan.search.misplacement.displacements import BaseDisplacements
-from cellplan.search.misplacement.guarded import GuardedProblem
+from cellplan.search.misplacement.guarded import guarded
 from cellplan.search.misplacement.robust import RobustSearch, ScenarioProblem, robust_layout, seeded_signs
 from cellplan.search.misplacement.tolerance import tolerances
 from cellplan.search.misplacement.worst import worst
@@ -31,11 +31,15 @@ def displaced_cell(cell: Path, settings: tuple[str, ...] = ()) -> SimpleNamespac
     request = LayoutRequest(cell=cell, settings=settings)
     ready = PreparedSearch.of(request, searched_cell(request))
     of = BaseDisplacements.of(ready.variables, ready.variables.given, AMOUNTS)
-    problem = GuardedProblem.like(ready.problem(33), variables=of, bodies=CellDistances.of(ready.scene, of))
+    problem = guarded(ready.problem(33)).of_variables(of)
     point = problem.evaluate(of.given, ready.given_start)
     assert point is not None
     demands = Demands(objective=Objective.CYCLE, margin=np.zeros(len(point.start)))
     return SimpleNamespace(of=of, problem=problem, point=point, demands=demands, ready=ready)
+
+
+def displaced(case: SimpleNamespace, d: np.ndarray, start: np.ndarray) -> Cell:
+    return case.of.cell(d, values_of(case.ready, case.of.x, start))
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +50,7 @@ def pair() -> SimpleNamespace:
 def test_all_bases_are_displaced_along_the_axes_of_the_world(pair: SimpleNamespace) -> None:
     given, d = pair.ready.variables.base, np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0, -1.0]) * pair.of.amounts
 
-    cell = pair.of.cell(d, pair.point.start)
+    cell = displaced(pair, d, pair.point.start)
     placed = pair.of.placed(d)
 
     for robot, sign in zip(given.robots, (1.0, -1.0), strict=True):
@@ -120,7 +124,7 @@ def test_scenarios_have_the_derivatives_of_their_differences(pair: SimpleNamespa
 
 def test_a_robust_layout_keeps_its_demands_in_all_corners(pair: SimpleNamespace) -> None:
     search = RobustSearch(
-        problem=GuardedProblem.like(pair.ready.problem(33)),
+        problem=guarded(pair.ready.problem(33)),
         displacements=pair.of,
         demands=pair.demands,
         effort=Effort(iterations=3, keys=5),
@@ -135,7 +139,7 @@ def test_a_robust_layout_keeps_its_demands_in_all_corners(pair: SimpleNamespace)
     assert robust.is_met
     assert len(robust.corners) == robust.worst_ones + robust.ends + len(signs)
     assert robust.nominal <= robust.cycle < before.cycle
-    finer = search.finer(GuardedProblem.like(pair.ready.problem(49)), robust, Effort(iterations=1, keys=5))
+    finer = search.finer(guarded(pair.ready.problem(49)), robust, Effort(iterations=1, keys=5))
     assert finer.once(robust.improved.x, robust.improved.start) is not None
 
 
@@ -143,7 +147,7 @@ def test_a_corner_moves_as_the_product_solves_it(pair: SimpleNamespace) -> None:
     d = np.where(np.arange(8) % 3 == 0, -1.0, 1.0) * pair.of.amounts
     corner = judged(pair.problem, d[None], pair.point.start, pair.demands, Effort(keys=9))[0]
 
-    solution = solve(pair.of.cell(d, corner.start))
+    solution = solve(displaced(pair, d, corner.start))
 
     limits = pair.problem.limits
     q = solution.motion.q

@@ -11,18 +11,16 @@ from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
-from cellplan.jobs.fastest.timed_program import Law, TimedProgram, scaled_values
-from cellplan.jobs.layout.finish.cycles import load_of, required_time
+from cellplan.jobs.fastest.timed_program import TimedProgram
+from cellplan.jobs.layout.finish.cycles import draft, load_of, required_time, scaled
 from cellplan.jobs.layout.finish.finish import margin_of, rejection_of
 from cellplan.jobs.layout.request import LayoutRequest
-from cellplan.jobs.layout.trials.prepared import NOT_FOLLOWED, PreparedSearch, prepared
+from cellplan.jobs.layout.trials.prepared import NOT_FOLLOWED, PreparedSearch, prepared, values_of
 from cellplan.model.cell.cell import Cell, stacked_positions
-from cellplan.model.progress import silent
+from cellplan.model.progress import Progress, silent
 from cellplan.runs.early_clearance import EarlyClearance
-from cellplan.search.kernel.job import Job
-from cellplan.search.kernel.run import run
 from cellplan.search.misplacement.displacements import BaseDisplacements
-from cellplan.search.programs.layout_problem import LayoutProblem
+from cellplan.search.misplacement.guarded import guarded
 from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 
@@ -50,10 +48,10 @@ class DisplacedLayout:
             components=self.components,
             amounts=np.ones(len(self.robots)),
         )
-        motion = run(_job(ready), of.layouts(d[None], start[None]))
-        if not motion.is_followed[0]:
+        point = guarded(ready.coarse).of_variables(of).evaluate(d, start)
+        if point is None:
             raise NoSolutionError(NOT_FOLLOWED)
-        return of.cell(d, motion.q[0, 0])
+        return of.cell(d, values_of(ready, of.x, point.start))
 
 
 def verified(layout: DisplacedLayout, variant: Variant) -> TrialOutcome:
@@ -68,10 +66,7 @@ def verified(layout: DisplacedLayout, variant: Variant) -> TrialOutcome:
     ready = prepared(layout.request, layout.choice)
     try:
         d, start = (np.array(values[key], dtype=float) for key in ("d", "start"))
-        cell, law, scaled = layout.cell(ready, d, start), Law.AS_WRITTEN, dict[str, object]()
-        if layout.factor is not None:
-            law, scaled = Law.TIME_LAWS, scaled_values(cell, layout.factor)
-        program = TimedProgram.solved(cell, law, scaled, task=None, progress=silent)
+        program = solved_in(ready, layout.cell(ready, d, start), layout.factor, silent)
         reason, is_apart = rejection_of(program, ready.variables), True
         if not reason and not (is_apart := _is_apart(program)):
             program = program.certified(silent, EarlyClearance())
@@ -80,21 +75,16 @@ def verified(layout: DisplacedLayout, variant: Variant) -> TrialOutcome:
         return TrialOutcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
     figures = {
         "load": max(load_of(program), required_time(program)),
+        "cycle_s": program.cycle,
         "margin_deg": margin_of(program),
         "is_apart": is_apart,
     }
     return TrialOutcome(status=TrialStatus.FAILED if reason else TrialStatus.PASSED, reason=reason, figures=figures)
 
 
-def _job(ready: PreparedSearch) -> Job:
-    """The job at the nodes of the trials.
-
-    Raises:
-        TypeError: The positioner has a joint path.
-    """
-    if not isinstance(ready.coarse, LayoutProblem):
-        raise TypeError("displaced bases: expected motions by the pseudo-inverse, got a joint path")
-    return ready.coarse.job
+def solved_in(ready: PreparedSearch, cell: Cell, factor: float | None, progress: Progress) -> TimedProgram:
+    """The program of a cell, slower or faster by a factor, verified but for its clearance."""
+    return draft(ready, cell, ready.duration, progress) if factor is None else scaled(cell, factor, progress)
 
 
 def _is_apart(program: TimedProgram) -> bool:

@@ -11,9 +11,9 @@ import numpy as np
 
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
-from cellplan.jobs.fastest.timed_program import Law, TimedProgram, whole_steps
-from cellplan.jobs.layout.finish.cycles import load_of, required_time, scaled
-from cellplan.jobs.layout.finish.displaced import DisplacedLayout, verified
+from cellplan.jobs.fastest.timed_program import TimedProgram, whole_steps
+from cellplan.jobs.layout.finish.cycles import is_scaled, load_of, required_time
+from cellplan.jobs.layout.finish.displaced import DisplacedLayout, solved_in, verified
 from cellplan.jobs.layout.finish.finish import (
     FINISH,
     MORE_ANGLE,
@@ -31,7 +31,7 @@ from cellplan.jobs.layout.finish.finish import (
 from cellplan.jobs.layout.misplacement_record import CornerRecord, MisplacementRecord, ToleranceRecord
 from cellplan.jobs.layout.trials.limits import standing_of
 from cellplan.jobs.layout.trials.prepared import NODES as FEW_NODES
-from cellplan.jobs.layout.trials.prepared import NOT_FOLLOWED
+from cellplan.jobs.layout.trials.prepared import NOT_FOLLOWED, UNLIMITED, is_fastest, values_of
 from cellplan.jobs.layout.trials.proposals import BESTS, SAME
 from cellplan.model.cell.cell import Cell
 from cellplan.model.seeds import generator
@@ -41,10 +41,10 @@ from cellplan.report.record.common import number
 from cellplan.runs.early_clearance import EarlyClearance
 from cellplan.search.misplacement.corners import Corner
 from cellplan.search.misplacement.displacements import BaseDisplacements
-from cellplan.search.misplacement.guarded import GuardedProblem
+from cellplan.search.misplacement.guarded import guarded
 from cellplan.search.misplacement.robust import WITHIN, Robust, RobustSearch, robust_layout, seeded_signs
 from cellplan.search.misplacement.tolerance import BaseTolerance, tolerances
-from cellplan.search.programs.objective import Effort, Objective
+from cellplan.search.programs.objective import CycleTiming, Demands, Effort, Objective
 from cellplan.study.study import Study
 from cellplan.study.trial import StudyTrial, Variant
 from cellplan.study.workers import Limits
@@ -58,6 +58,7 @@ DURATIONS: Final = 4  # [-] durations tried until the limits hold
 MORE_TIME: Final = 0.003  # [-] that a cycle of the nodes is lengthened by: peaks between them
 MORE_LENGTH: Final = 0.002  # [m] asked for beyond the demands where distances were not kept
 NARROWER: Final = 4  # [-] displacements verified in each direction until a tolerance is known
+OF_PROGRAM: Final = 16  # [-] seeded corners of a program, whose transfers are planned in each; and one displacement
 SECONDS: Final = 900.0  # [s] of the processor to verify one layout
 FINE: Final = 3  # decimals of figures in [mm] and [deg]
 
@@ -70,6 +71,7 @@ class _Verdict:
 
     reason: str  # why it is rejected; empty where it passed
     load: float  # how many times as long its limits ask it to last; 0 where it has no motion
+    cycle: float  # its cycle in [s]; 0 where it has no motion
     is_mendable: bool  # whether only a margin or a distance is missed, so that the search may ask for more
 
 
@@ -88,7 +90,7 @@ class MisplacedFinish(Finish):
             cycle = trial.figures[BESTS[Objective.CYCLE].figure]
             if all(abs(cycle - other.figures["cycle_s"]) > SAME * cycle for other in listed):
                 listed.append(trial)
-        listed = listed[:FINALISTS]
+        listed = listed[: FINALISTS if self.ready.phases is None else 1]
 
         def rank(finalist: Finalist) -> tuple[int, float]:
             robust = None if finalist.begun is None else finalist.begun[1]
@@ -110,7 +112,7 @@ class MisplacedFinish(Finish):
         self.progress(f"displacing the bases of trial {trial.number}", 1.0)
         made, effort = self._with_choice_of(trial), MANY
         corners = _Corners(made, trial.number)
-        search = search.finer(GuardedProblem.like(problem_of(made.ready, NODES)), robust, effort)
+        search = search.finer(guarded(problem_of(made.ready, NODES)), robust, effort)
         for _ in range(ATTEMPTS):
             x, start = robust.improved.x, robust.improved.start
             robust = robust_layout(search, (x, start), signs=made.signs(search)) or robust
@@ -128,16 +130,27 @@ class MisplacedFinish(Finish):
         self.progress(f"displacing the bases of trial {trial.number}", 0.0)
         made, (x, start) = self._with_choice_of(trial), layout_of(trial)
         search = RobustSearch(
-            problem=GuardedProblem.like(problem_of(made.ready, FEW_NODES)),
+            problem=guarded(problem_of(made.ready, FEW_NODES)),
             displacements=BaseDisplacements.of(made.ready.variables, x, self.misplacement),
-            demands=made.ready.demands(),
+            demands=made.demands(),
             effort=FEW,
         )
         return search, robust_layout(search, (x, start), signs=made.signs(search), rounds=FEW_ROUNDS)
 
+    def demands(self) -> Demands:
+        """What is demanded of every corner: of retimed programs, whose corners have no common clock, as any takes."""
+        is_retimed = self.ready.phases is not None and is_fastest(self.ready)
+        return self.ready.demands(**({"duration": UNLIMITED, "timing": CycleTiming.LAWS} if is_retimed else {}))
+
+    def learned(self, result: CandidateResult) -> CandidateResult:
+        """See ``Finish``: a layout whose corners are verified stays as it is."""
+        return result
+
     def signs(self, search: RobustSearch) -> Array:
         """The seeded corners."""
-        return seeded_signs(generator("layout/misplacement", self.ready.request.seed), len(search.displacements.names))
+        rng = generator("layout/misplacement", self.ready.request.seed)
+        signs = seeded_signs(rng, len(search.displacements.names))
+        return signs if self.ready.phases is None else signs[:OF_PROGRAM]
 
 
 @dataclass(slots=True)
@@ -150,7 +163,7 @@ class _Corners:
 
     def result(self, robust: Robust, effort: Effort) -> tuple[CandidateResult, tuple[float, float] | None]:
         """The layout solved and all its corners verified, and the margin and distance to ask for where one failed."""
-        x, start, demands = robust.improved.x, robust.improved.start, self.finish.ready.demands()
+        x, start, demands = robust.improved.x, robust.improved.start, self.finish.demands()
         standing = standing_of(problem_of(self.finish.ready, NODES), robust.improved.point, demands, effort)
         program, solved, reason, verdicts = None, list[CornerRecord](), "", list[_Verdict]()
         missing, record = None, None
@@ -185,12 +198,11 @@ class _Corners:
         Returns:
             The program of the layout, its worst corners, why one of them failed, and the verdicts.
         """
-        of, listed = robust.displacements, list(_chosen(robust))
-        cells = [self.finish.ready.variables.cell(robust.improved.x, robust.improved.start)]
-        cells += [of.cell(corner.d, corner.start) for _, corner in listed]
-        factor = None
-        if self.finish.ready.request.objective is Objective.CYCLE:
-            factor = whole_steps(cells[0], (1.0 + MORE_TIME) * robust.cycle / self.finish.ready.duration)
+        of, listed, ready = robust.displacements, list(_chosen(robust)), self.finish.ready
+        placed = [(of.given, robust.improved.start), *((corner.d, corner.start) for _, corner in listed)]
+        cells, factor = [of.cell(d, values_of(ready, of.x, start)) for d, start in placed], None
+        if is_scaled(ready):
+            factor = whole_steps(cells[0], (1.0 + MORE_TIME) * robust.cycle / ready.duration)
         for _ in range(DURATIONS):
             programs, factor = self._solved_together(cells, factor)
             verdicts = self._verdicts(
@@ -211,13 +223,10 @@ class _Corners:
     def _solved_together(self, cells: Sequence[Cell], factor: float | None) -> tuple[list[TimedProgram], float | None]:
         """Programs of cells in the shortest common cycle that all of them keep, from a given one on, and its factor."""
         self.solves += len(cells)
-        if factor is None:
-            solved = partial(
-                TimedProgram.solved, law=Law.AS_WRITTEN, values={}, task=None, progress=self.finish.progress
-            )
-            return [solved(cell) for cell in cells], None
         for _ in range(DURATIONS):
-            programs = [scaled(cell, factor, self.finish.progress) for cell in cells]
+            programs = [solved_in(self.finish.ready, cell, factor, self.finish.progress) for cell in cells]
+            if factor is None:
+                break
             required = max(max(load_of(program), required_time(program)) for program in programs)
             if required <= 1.0:
                 break
@@ -266,14 +275,12 @@ class _Corners:
         margin = figures.get("margin_deg")
         is_mendable = bool(figures) and (not figures["is_apart"] or (margin is not None and margin < demanded))
         reason = "" if trial.passed else trial.outcome.reason
-        return _Verdict(reason, figures.get("load") or 0.0, is_mendable)
+        return _Verdict(reason, figures.get("load") or 0.0, figures.get("cycle_s") or 0.0, is_mendable)
 
     def _tolerances(self, robust: Robust, program: TimedProgram, effort: Effort) -> list[BaseTolerance]:
         """How far each base may be off, found at the nodes and verified; less where that fails."""
-        factor = None
-        if self.finish.ready.request.objective is Objective.CYCLE:
-            factor = program.cycle / self.finish.ready.duration
-        finer, demands, start = replace(effort, within=WITHIN), self.finish.ready.demands(), robust.improved.start
+        factor = program.cycle / self.finish.ready.duration if is_scaled(self.finish.ready) else None
+        finer, demands, start = replace(effort, within=WITHIN), self.finish.demands(), robust.improved.start
         measured = list(tolerances(robust.problem, start, demands, finer, max(program.cycle, robust.cycle)))
         of = robust.displacements
         ends = np.tile(of.amounts, 2)  # verified already, as far as the nodes do not say otherwise
@@ -285,7 +292,7 @@ class _Corners:
             [tolerance.first for tolerance in measured],
         )
         at, open_ones = upper.copy(), [place for place, verdict in enumerate(measured) if verdict.extent > 0.0]
-        for _ in range(NARROWER):
+        for _ in range(NARROWER if self.finish.ready.phases is None else 1):
             placed = [(at[place] * measured[place].unit, measured[place].start) for place in open_ones]
             verdicts = self._verdicts(robust, placed, factor) if placed else []
             for place, verdict in zip(open_ones, verdicts, strict=True):
@@ -315,8 +322,8 @@ class _Corners:
         return {
             "position_mm": number(self.finish.misplacement.position_mm),
             "orientation_deg": number(self.finish.misplacement.orientation_deg),
-            "cycle_s": number(round(cycle, 6)),
-            "nominal_cycle_s": number(round(robust.nominal, 6)),
+            "cycle_s": number(round(max(cycle, *(verdict.cycle for verdict in verdicts)), 6)),
+            "nominal_cycle_s": number(round(robust.nominal if self.finish.ready.phases is None else cycle, 6)),
             "seeded": len(groups[2]),
             "seeded_kept": passing[2],
             "by_derivatives": len(groups[0]),

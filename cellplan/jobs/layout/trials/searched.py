@@ -63,9 +63,6 @@ def _refuse_of_program(request: LayoutRequest, cell: Cell) -> None:
             f"{at('motion.timing')}: expected as_written or fastest for a layout search of a program, got a cycle: "
             "write fastest, and cycle_s into what comes of it"
         )
-    if request.misplacement is not None or (layout is not None and layout.misplacement is not None):
-        key = "--misplacement" if request.misplacement is not None else at("layout.misplacement")
-        raise InputError(f"{key}: expected no misplaced bases with a program from home to home; leave it out")
     if layout is None:
         return
     vary = "--free" if request.free else at("layout.vary")
