@@ -116,7 +116,8 @@ class _Search:
                     break
         best = min(passed, key=lambda result: (result.cycle, result.trial), default=None)
         if best is not None and is_estimate:
-            self.tried[best.trial] = best = self.finish.learned(best)
+            [trial] = (it for it in finished.trials if it.number == best.trial)
+            self.tried[best.trial] = best = self.finish.learned(trial, best)
         return best
 
     def candidates(self, finished: Finished) -> list[StudyTrial]:

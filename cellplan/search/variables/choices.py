@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, cast
 
 from cellplan.errors import InputError
 from cellplan.model.cell.cell import Cell
@@ -33,8 +33,8 @@ class Choices:
     def values(self) -> Iterator[dict[str, object]]:
         """Every combination as values by address for ``Cell.with_values``; the present one, without values, first.
 
-        Combinations in which a robot would have two tasks, without a program, are left out. Robots whose task changes
-        have their start posture searched.
+        Combinations in which a robot would have two tasks, without a program, are left out. Robots whose tasks change
+        have their start posture searched, and so has a task of a program that another robot does.
         """
         present = tuple(self._present(choice) for choice in self.chosen)
         yield {}
@@ -61,15 +61,19 @@ class Choices:
 
     def _values(self, picks: tuple[str, ...]) -> dict[str, object]:
         """One combination."""
-        values = dict[str, object]()
+        values, document = dict[str, object](), cast("dict[str, Any]", self.cell.origin.document)
         for choice, pick in zip(self.chosen, picks, strict=True):
             if pick != self._present(choice):
                 values[choice.address] = pick
-        document: Any = self.cell.origin.document["robots"]
-        changed = {robot for task, robot in self._robots(picks).items() if robot != self.cell.task(task).robot}
+        given = {task.name: task.robot for task in self.cell.tasks}
+        moved = {task: robot for task, robot in self._robots(picks).items() if robot != given[task]}
+        changed = {*moved.values(), *(given[task] for task in moved if self.cell.program.is_home_to_home)}
+        for task in moved:
+            for key in {"start", "start_deg"}.intersection(document["tasks"][task]):
+                values[f"tasks.{task}.{key}"] = "auto"
         for robot in self.cell.robots:
             if robot.name in changed:
-                key = "start" if "start" in document[robot.name] else "start_deg"
+                key = "start" if "start" in document["robots"][robot.name] else "start_deg"
                 turns = all(joint.is_revolute for joint in robot.model.joints)
                 values[f"robots.{robot.name}.{key if turns else 'start'}"] = "auto"
         return values

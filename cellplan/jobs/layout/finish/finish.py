@@ -159,16 +159,16 @@ class Finish:
         trial = finalist.trial
         return self._with_choice_of(trial)._certified(trial.number, *layout_of(trial))
 
-    def learned(self, result: CandidateResult) -> CandidateResult:
+    def learned(self, trial: StudyTrial, result: CandidateResult) -> CandidateResult:
         """A certified program improved again with the detours that its transfers take, while it becomes shorter."""
-        finish, best = self, result
+        finish, best = self._with_choice_of(trial), result
         for _ in range(LEARNED):
             phases, problem = finish.ready.phases, finish.ready.coarse
             point = problem.evaluate(best.x, best.start)
             if phases is None or not isinstance(problem, ProgramProblem) or point is None or best.program is None:
                 break
             phases = phases.with_detours(problem, point, best.program.solution)
-            finish = replace(self, ready=replace(self.ready, phases=phases))
+            finish = replace(finish, ready=replace(finish.ready, phases=phases))
             self.progress(f"certifying trial {result.trial} with the detours of its transfers", 1.0)
             again = finish._certified(result.trial, best.x, best.start)
             again = replace(again, solves=best.solves + again.solves)

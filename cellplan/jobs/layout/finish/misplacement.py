@@ -142,7 +142,7 @@ class MisplacedFinish(Finish):
         is_retimed = self.ready.phases is not None and is_fastest(self.ready)
         return self.ready.demands(**({"duration": UNLIMITED, "timing": CycleTiming.LAWS} if is_retimed else {}))
 
-    def learned(self, result: CandidateResult) -> CandidateResult:
+    def learned(self, trial: StudyTrial, result: CandidateResult) -> CandidateResult:  # noqa: ARG002 - of the finish
         """See ``Finish``: a layout whose corners are verified stays as it is."""
         return result
 

@@ -12,7 +12,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.trials.joint_path import PathSearch, resolving, without_path
 from cellplan.jobs.layout.trials.phases import ProgramPhases, starts_of
-from cellplan.jobs.layout.trials.searched import searched_cell
+from cellplan.jobs.layout.trials.searched import refuse_unsearchable, searched_cell
 from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.cell.layout import VariableKind
@@ -35,7 +35,6 @@ from cellplan.search.programs.program_problem import ProgramProblem
 from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.starts.generator import StartGenerator
 from cellplan.search.starts.problem import StartProblem
-from cellplan.search.synchronous import refuse_other_jobs
 from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
@@ -306,5 +305,5 @@ def _prepared(
     cell = searched_cell(request)
     if choice:
         cell = cell.with_values(dict(choice))
-        refuse_other_jobs(cell, "a layout search")
+        refuse_unsearchable(request, cell)
     return PreparedSearch.of(request, cell)

@@ -86,7 +86,8 @@ class Proposals:
 
     def __call__(self, finished: Sequence[StudyTrial]) -> list[dict[str, Any]]:
         """Values of the trials of the next round."""
-        return [replace(proposal, detours=self.detours).values for proposal in self.next_round(finished)]
+        proposed = self.next_round(finished)  # other choices have other transfers
+        return [replace(it, detours=None if it.choice else self.detours).values for it in proposed]
 
     def next_round(self, finished: Sequence[StudyTrial]) -> list[Proposal]:
         """What the next round tries."""

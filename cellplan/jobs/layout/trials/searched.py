@@ -10,7 +10,7 @@ from cellplan.files.cell.load import load_cell
 from cellplan.files.input.findings import did_you_mean, listed, shown
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.model.cell.cell import Cell, Timing
-from cellplan.model.cell.layout import VariableKind
+from cellplan.model.cell.layout import ChoiceKind, VariableKind
 from cellplan.model.units import DEG, MM
 from cellplan.runs.overrides import with_overrides
 from cellplan.search.programs.objective import CycleTiming, Objective
@@ -42,11 +42,8 @@ def searched_cell(request: LayoutRequest) -> Cell:
     elif request.vary or request.fixed:
         values["layout.vary"] = _varied(cell, request)
     changed = cell.with_values(values) if values else cell
-    paths = () if changed.layout is None else [path.robot for path in changed.layout.paths]
-    if changed.program.is_home_to_home:
-        _refuse_of_program(request, changed)
-    else:
-        refuse_other_jobs(changed, "a layout search", paths=paths)
+    paths = () if changed.layout is None else changed.layout.paths
+    refuse_unsearchable(request, changed)
     if paths:
         _refuse_open_tasks(changed, purpose="--free path" if request.free else "layout.vary: a joint path")
     _refuse_margins(changed)
@@ -54,9 +51,13 @@ def searched_cell(request: LayoutRequest) -> Cell:
     return changed
 
 
-def _refuse_of_program(request: LayoutRequest, cell: Cell) -> None:
-    """Refuse what a search cannot change, or judge, in a program from home to home."""
+def refuse_unsearchable(request: LayoutRequest, cell: Cell) -> None:
+    """Refuse motions that a search cannot judge, and what it cannot change in a program from home to home."""
     at, motion, layout = cell.origin.at, cell.motion, cell.layout
+    if not cell.program.is_home_to_home:
+        paths = () if layout is None else [path.robot for path in layout.paths]
+        refuse_other_jobs(cell, "a layout search", paths=paths)
+        return
     refuse_other_methods(replace(cell, motion=replace(motion, timing=Timing.AS_WRITTEN)), "a layout search")
     if motion.timing is Timing.CYCLE:
         raise InputError(
@@ -66,9 +67,9 @@ def _refuse_of_program(request: LayoutRequest, cell: Cell) -> None:
     if layout is None:
         return
     vary = "--free" if request.free else at("layout.vary")
-    if layout.choices or layout.paths:
-        address = layout.choices[0].address if layout.choices else f"robots.{layout.paths[0].robot}.path"
-        raise InputError(f"{vary}: expected no choices and no joint path with a program, got {address}; leave it out")
+    branches = [f"robots.{choice.name}.branch" for choice in layout.choices if choice.kind is ChoiceKind.BRANCH]
+    for address in [*branches, *(f"robots.{path.robot}.path" for path in layout.paths)]:
+        raise InputError(f"{vary}: expected no branch and no joint path with a program, got {address}; leave it out")
     for variable in layout.ranges:
         is_other_start = variable.kind is VariableKind.START and variable.name not in cell.positioners[:1]
         if is_other_start or variable.kind is VariableKind.GRASP:
