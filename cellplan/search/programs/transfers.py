@@ -2,7 +2,8 @@ r"""Transfers: an estimate of the time between the motions of a program, each tr
 
 All joints of a transfer share one law, whose bounds of speed, acceleration and jerk are the least of all joints; see
 ``planning.transfer.straight_time``. Here the least is that of a p-norm, :math:`1/v = \|\Delta q_i / V_i\|_p`, so that
-the time has derivatives where two joints are as slow as each other; it is a little longer than the true one.
+the time has derivatives where two joints are as slow as each other; it is a little longer than the true one. Limits of
+points in the world count as in the given layout. A transfer over via points rests in each of them: it has several legs.
 
 A transfer that is not free straight has to go round what is in its way. With :math:`\delta` the p-norm of what bodies
 miss of their demanded distances at some configurations along it, and a little more, it is taken to last
@@ -35,23 +36,33 @@ HOME: Final = -1  # in place of a node
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Transfers:
-    """The motions of a program, and the T transfers between them."""
+    """The motions of a program, and the R transfers between them with T straight legs in all."""
 
     parts: tuple[slice, ...]  # nodes of the motions
-    ends: Indices  # nodes that each joint of a transfer moves from and to, or ``HOME``, shape (2, T, nq)
-    home: Array  # homes of all robots in [rad] or [m], shape (nq,)
+    ends: Indices  # nodes that each joint of a leg moves from and to, or ``HOME``, shape (2, T, nq)
+    home: Array  # where joints stand at ``HOME`` in [rad] or [m]: homes and via points, shape (2, T, nq)
+    of: Indices  # the transfer that each leg belongs to, shape (T,)
     bounds: JointLimitsInTime  # limits of the joints
     step: float  # time between two rows in [s]
-    bodies: tuple[CellDistances, ...]  # the bodies during each of them
-    detours: Array  # by how many times longer each of them takes where bodies are deep in each other, shape (T,)
+    stays: Array  # time in [s] for which all robots stand in each transfer, shape (R,)
+    bodies: tuple[CellDistances, ...]  # the bodies during each leg
+    detours: Array  # by how many times longer each transfer takes where bodies are deep in each other, shape (R,)
 
     @classmethod
     def none(cls, joints: int, *, nodes: int) -> "Transfers":
         """Those of a single motion."""
-        nothing = np.zeros(joints)
-        bounds = JointLimitsInTime(velocity=nothing, acceleration=nothing, jerk=nothing)
-        ends, parts = np.zeros((2, 0, joints), dtype=np.intp), (slice(0, nodes),)
-        return cls(parts=parts, ends=ends, home=nothing, bounds=bounds, step=1.0, bodies=(), detours=np.zeros(0))
+        nothing, none = np.zeros(joints), np.zeros(0)
+        return cls(
+            parts=(slice(0, nodes),),
+            ends=np.zeros((2, 0, joints), dtype=np.intp),
+            home=nothing,
+            of=none.astype(np.intp),
+            bounds=JointLimitsInTime(velocity=nothing, acceleration=nothing, jerk=nothing),
+            step=1.0,
+            stays=none,
+            bodies=(),
+            detours=none,
+        )
 
     def repeated(self, count: int) -> Self:
         """The same with the nodes of each motion so many times one after the other, of which the first ones count."""
@@ -69,48 +80,54 @@ class Transfers:
     def seconds(self, x: Array, q: Array) -> float:
         """Time of them all in [s], for variables of shape (n,) and joint positions at the nodes, shape (N, nq)."""
         times, shares = self._straight(x, q)
-        return float(times @ (1.0 + self.detours * shares))
+        return float(times @ (1.0 + self.detours[self.of] * shares) + self.stays.sum())
 
     def learned(self, x: Array, q: Array, seconds: Sequence[float]) -> Self:
-        """The same with the detours of a planned program, whose transfers take so many seconds, shape (T,)."""
+        """The same with the detours of a planned program, whose transfers take so many seconds, shape (R,)."""
         times, shares = self._straight(x, q)
-        shown = (np.array(seconds) / np.maximum(times, self.step) - 1.0) / np.maximum(shares, SHORTEST)
-        return replace(self, detours=np.where(times * shares > 0.0, np.clip(shown, *DETOURS), self.detours))
+        straight, blocked = (np.bincount(self.of, each, len(self.detours)) for each in (times, times * shares))
+        shown = (np.array(seconds) - self.stays - straight) / np.maximum(blocked, SHORTEST)
+        return replace(self, detours=np.where(blocked > 0.0, np.clip(shown, *DETOURS), self.detours))
 
     def _straight(self, x: Array, q: Array) -> tuple[Array, Array]:
         """Times of straight moves in [s] and shares of their detours, shape (T,) each."""
         begin, end = self._ends(q, self.home)
         depths = np.array([depth_along(bodies, x, *at)[0] for bodies, *at in zip(self.bodies, begin, end, strict=True)])
-        return self._times(end - begin), depths / (depths + DEEP)
+        return self._times(begin, end), depths / (depths + DEEP)
 
     def derivatives(self, x: Array, q: Array, dq: Array) -> Array:
         """Derivatives of this time by the variables, shape (n,), from those of the joints, shape (N, nq, n)."""
         total, (begin, end) = np.zeros(len(x)), self._ends(q, self.home)
-        changes = self._ends(dq, np.zeros((len(self.home), len(x))))
-        times, sides = self._times(end - begin), STEP * np.eye(len(self.home))
+        changes = self._ends(dq, np.zeros(dq.shape[1:]))
+        times, detours, sides = self._times(begin, end), self.detours[self.of], STEP * np.eye(q.shape[1])
         for place, bodies in enumerate(self.bodies):
-            move, by = end[place] - begin[place], changes[1][place] - changes[0][place]
-            slopes = (self._times(move + sides) - self._times(move - sides)) / (2.0 * STEP)
-            depth, by_depth = depth_along(bodies, x, begin[place], end[place], changes[:, place])
-            total += (1.0 + self.detours[place] * depth / (depth + DEEP)) * slopes @ by
-            total += times[place] * self.detours[place] * DEEP / (depth + DEEP) ** 2 * by_depth
+            a, b = begin[place], end[place]
+            by_begin = (self._times(a + sides, b) - self._times(a - sides, b)) / (2.0 * STEP)
+            by_end = (self._times(a, b + sides) - self._times(a, b - sides)) / (2.0 * STEP)
+            depth, by_depth = depth_along(bodies, x, a, b, changes[:, place])
+            slopes = by_begin @ changes[0, place] + by_end @ changes[1, place]
+            total += (1.0 + detours[place] * depth / (depth + DEEP)) * slopes
+            total += times[place] * detours[place] * DEEP / (depth + DEEP) ** 2 * by_depth
         return total
 
     def _ends(self, of_nodes: Array, at_home: Array) -> Array:
-        """Values at both ends of each transfer, shape (2, T, nq, ...), from those of the nodes, (N, nq, ...)."""
+        """Values at both ends of each leg, shape (2, T, nq, ...), from those of the nodes, (N, nq, ...)."""
         is_home = (self.ends == HOME).reshape(*self.ends.shape, *(1,) * (of_nodes.ndim - 2))
-        ends: Array = np.where(is_home, at_home, of_nodes[self.ends, np.arange(len(self.home))])
+        ends: Array = np.where(is_home, at_home, of_nodes[self.ends, np.arange(of_nodes.shape[1])])
         return ends
 
-    def _times(self, moves: Array) -> Array:
-        """Times of straight moves in [s], shape (..., nq) to (...)."""
-        length, bounds = np.abs(moves), self.bounds
+    def _times(self, begin: Array, end: Array) -> Array:
+        """Times of straight moves in [s], shape (..., nq) each to (...)."""
+        length, bounds = np.abs(end - begin), self.bounds
         v, a, j = (
             1.0 / np.maximum(np.linalg.norm(length / limit, ord=NORM, axis=-1), SHORTEST)[..., None]
             for limit in (bounds.velocity, bounds.acceleration, bounds.jerk)
         )
         shared = JointLimitsInTime(velocity=v, acceleration=a, jerk=j)
-        times: Array = box_widths(np.ones_like(v), shared, least=self.step).sum(axis=-1)
+        highest = [np.full(length.shape[:-1], np.inf)]
+        highest += [points.straight_rate(begin, end, self.step) for points in bounds.points]
+        widths = box_widths(np.ones_like(v), shared, least=self.step, highest=np.min(highest, axis=0))
+        times: Array = widths.sum(axis=-1)
         return np.where(length.max(axis=-1, initial=0.0) > SHORTEST, times, 0.0)
 
 

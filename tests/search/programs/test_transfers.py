@@ -32,8 +32,10 @@ def _seconds(begin: np.ndarray, end: np.ndarray) -> float:
         parts=(slice(0, 1), slice(1, 2)),
         ends=ends,
         home=np.zeros(JOINTS),
+        of=np.zeros(1, dtype=int),
         bounds=BOUNDS,
         step=STEP,
+        stays=np.zeros(1),
         bodies=bodies,
         detours=np.ones(1),
     )

@@ -12,7 +12,7 @@ from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.cell.layout import VariableKind
 from cellplan.planning.sequence.stages import Stage, program_stages
 from cellplan.runs.plan.retiming import transfer_retimer
-from cellplan.runs.plan.sequence import PlannedProgram, PlannedStage, plan_work
+from cellplan.runs.plan.sequence import Pass, PlannedProgram, PlannedStage, plan_work, via_points
 from cellplan.runs.solution import Solution
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import MOST, Job, enough_nodes
@@ -25,6 +25,7 @@ from cellplan.search.variables.variables import Variables
 from cellplan.search.variables.written import written_start, written_task_start
 
 SAME: Final = 1e-4  # [rad] or [m] within which a home that is found is the start of a phase
+NODE: Final = 1e6  # [rad] or [m] beyond any joint: what is added to the number of a node in place of a configuration
 FEWER: Final = 4  # [-] times fewer nodes of a straight move that grips or puts down the part
 
 
@@ -150,24 +151,28 @@ class ProgramPhases:
     def _transfers(self, counts: list[int]) -> Transfers:
         """The transfers between the phases with so many nodes, from home and back home."""
         cell, firsts = self.work.cell, np.cumsum([0, *counts])
-        homes = np.where(self._homes == HOME, HOME, firsts[self._homes])
-        ends, number, last = [], 0, homes
-        for stage in program_stages(cell):
-            if stage.phase.tasks:
-                number, last = number + 1, np.full(cell.joint_count, firsts[number + 1] - 1)
-            elif stage.dwell is None:
-                goal = np.full(cell.joint_count, firsts[number]) if number < len(counts) else homes
-                ends.append((last, goal))
-        retimer = transfer_retimer(self.work.scenes.held)
         home = np.concatenate([robot.home for robot in cell.robots if robot.home is not None])
+        homes = np.where(self._homes == HOME, home, NODE + firsts[self._homes])
+        stages, passed, number, last = program_stages(cell), list[list[Pass]](), 0, homes
+        for place, stage in enumerate(stages):
+            if stage.phase.tasks:
+                number, last = number + 1, np.full(cell.joint_count, NODE + firsts[number + 1] - 1)
+            elif stage.dwell is None:
+                goal = np.full(cell.joint_count, NODE + firsts[number]) if number < len(counts) else homes
+                passed.append(via_points(stages, place, (last, goal), home))
+        of = np.repeat(np.arange(len(passed)), [len(stops) - 1 for stops in passed])
+        legs = np.array([[leg[0][0], leg[1][0]] for stops in passed for leg in pairwise(stops)]).swapaxes(0, 1)
+        retimer = transfer_retimer(self.work.scenes.held)
         return Transfers(
             parts=tuple(slice(*edge) for edge in pairwise(firsts.tolist())),
-            ends=np.swapaxes(np.array(ends), 0, 1),
-            home=home,
+            ends=np.where(legs >= NODE, legs - NODE, HOME).astype(np.intp),
+            home=np.where(legs >= NODE, 0.0, legs),
+            of=of,
             bounds=retimer.bounds,
-            bodies=self.between,
+            bodies=tuple(self.between[transfer] for transfer in of),
             step=retimer.step,
-            detours=np.array(self.detours or [1.0] * len(ends)),
+            stays=np.array([sum(stays for _, stays in stops) for stops in passed]),
+            detours=np.array(self.detours or [1.0] * len(passed)),
         )
 
 
