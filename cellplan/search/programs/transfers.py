@@ -85,7 +85,7 @@ class Transfers:
     def learned(self, x: Array, q: Array, seconds: Sequence[float]) -> Self:
         """The same with the detours of a planned program, whose transfers take so many seconds, shape (R,)."""
         times, shares = self._straight(x, q)
-        straight, blocked = (np.bincount(self.of, each, len(self.detours)) for each in (times, times * shares))
+        straight, blocked = (np.bincount(self.of, legs, len(self.detours)) for legs in (times, times * shares))
         shown = (np.array(seconds) - self.stays - straight) / np.maximum(blocked, SHORTEST)
         return replace(self, detours=np.where(blocked > 0.0, np.clip(shown, *DETOURS), self.detours))
 
