@@ -26,7 +26,12 @@ from cellplan.report.text.method import moved_start_lines
 from cellplan.report.text.notes import reaches_nowhere
 from cellplan.report.text.run import count_text, failure_lines, left_out_lines
 from cellplan.runs.plan.given_starts import with_chosen_start, with_placed_starts
-from cellplan.runs.plan.program_faults import refuse_hanging_parts, refuse_sunk_parts, refuse_unnamed_supports
+from cellplan.runs.plan.program_faults import (
+    refuse_hanging_parts,
+    refuse_sunk_parts,
+    refuse_touching_postures,
+    refuse_unnamed_supports,
+)
 from cellplan.runs.plan.start import chosen_start, depths_on_paths
 from cellplan.scene.scene import Scene
 
@@ -70,6 +75,7 @@ def _check_program(cell: Cell, progress: Progress) -> CellCheck:
     refuse_sunk_parts(scenes)
     refuse_hanging_parts(scenes)
     refuse_unnamed_supports(scenes)
+    refuse_touching_postures(scenes.held)
     made = {
         stage.phase.name: _check_together(scenes.of_stage(stage), progress) for stage in blocks if stage.move is None
     }

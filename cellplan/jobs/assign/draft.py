@@ -17,7 +17,7 @@ from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Mode, Robot, Timing
 from cellplan.model.robot.robot import configuration_in_si, start_keys
 from cellplan.model.settings.assign import POSTURE_LIMIT, AssignEntry
-from cellplan.runs.plan.program_faults import refuse_crowded_homes
+from cellplan.runs.plan.program_faults import refuse_crowded_homes, refuse_touching_postures
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.problem.goals import Stations, task_goals
 from cellplan.search.assign.problem.reach import places_in_reach
@@ -56,9 +56,13 @@ class AssignmentDraft:
                 raise InputError(
                     f"{task.where('start_deg')}: unexpected key of an open task, whose robot is not known yet"
                 )
+            if task.name in robots and any(isinstance(it, np.ndarray) for it in (*task.via_before, *task.via_after)):
+                raise InputError(f"{task.where('via')}: expected home at an open task, whose robot is not known yet")
         draft = cls(cell=cell, robots=robots, file=Path(file))
         draft.stations()  # these and the homes are refused before anything is searched
-        refuse_crowded_homes(Scene.from_cell(cell), draft.home)
+        scene = Scene.from_cell(cell)
+        refuse_crowded_homes(scene, draft.home)
+        refuse_touching_postures(scene)
         return draft
 
     def without(self, tasks: Sequence[str]) -> "AssignmentDraft | None":
@@ -170,11 +174,6 @@ def refuse_unless_assignable(cell: Cell) -> None:
             raise InputError(
                 f"{task.where('holder_moves')}: unexpected key, as an assignment chooses the blocks in which the part "
                 "moves: write assign.groups: true instead"
-            )
-        if task.via_before or task.via_after:
-            raise InputError(
-                f"{task.where('via')}: unexpected key, as an assignment reckons with straight moves from task to task: "
-                "add it to the cell that is written"
             )
     if cell.assign is not None and cell.assign.groups:
         _refuse_moving_blocks(cell)

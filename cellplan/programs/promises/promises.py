@@ -10,6 +10,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.report.exported import Promise
 from cellplan.model.report.verified_run import ReadRun, VerifiedRun
 from cellplan.model.settings.controllers import ControllerEntry
+from cellplan.model.task.task import Service
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.promises.run_programs import moving_robots, run_programs, spoilt_by_another_order
@@ -194,9 +195,11 @@ def _remarks(export: _Export, promise: Promise) -> Iterator[str]:
                 yield from _unmet(export)
         case Promise.SYNCHRONISED:
             yield "same row at the same time within the blend zones; the controller may take longer than planned"
+            yield from _stays(export)
         case Promise.SEQUENCE_ONLY:
             yield "the controller makes the speed between rows: times and feeds of the plan are not kept"
             yield from _unwritten(cell)
+            yield from _stays(export)
 
 
 def _unmet(export: _Export) -> Iterator[str]:
@@ -211,6 +214,18 @@ def _unwritten(cell: Cell) -> Iterator[str]:
     names = [robot.name for robot in cell.robots if not waits(cell, robot.name)]
     if names and len(cell.robots) > 1:
         yield f"no format writes the waits of {listed(names)}: program the marks of export.json there by hand"
+
+
+def _stays(export: _Export) -> Iterator[str]:
+    """Times for which tools are cleaned, for which programs without times do not wait."""
+    for robot in export.robots:
+        of_robot = (task for task in export.run.cell.tasks if task.robot == robot)
+        names = [it.name for it in of_robot if any(isinstance(p, Service) for p in (*it.via_before, *it.via_after))]
+        if names and (service := export.run.cell.robot(robot).service):
+            yield (
+                f"no wait is written for the {service.takes:g} s in which the tool of '{robot}' is cleaned (via points "
+                f"of {listed(names)}): add one where it stands in robots.{robot}.service.at"
+            )
 
 
 def waits(cell: Cell, robot: str) -> bool:

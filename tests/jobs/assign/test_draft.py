@@ -40,6 +40,21 @@ def draft(folder: Path, *changes: tuple[str, str]) -> AssignmentDraft:
             "assign.groups: expected motion.timing: as_written, got fastest",
         ),
         (HOME, "", "robots.west: missing, expected home_deg"),
+        (
+            "robot: any",
+            "robot: any\n    via: {before: [home, [0, -40, 60, 0, 60, 0]]}",
+            "tasks.top_1.via: expected home at an open task",
+        ),
+        (
+            "robot: any",
+            "robot: west\n    via: {before: [home], after: [home, [-40, -60, 80, 0, 60, 0]]}",
+            "cell.yaml:33: tasks.top_1.via.after[1]: 'west' comes too close there: 'west/bracket' touches",
+        ),
+        (
+            HOME,
+            HOME + "    service: {at: [-40, -60, 80, 0, 60, 0], takes_s: 8, every: {seams: 2}}\n",
+            "robots.west.service.at: 'west' comes too close there",
+        ),
         (HOME, HOME + "    order: [top_1, top_2, top_3, edge_1, edge_2, edge_3, side_1, side_2]\n", "west.order: unex"),
     ],
 )

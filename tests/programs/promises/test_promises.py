@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from builders.commands import run_command
 
@@ -11,6 +12,7 @@ from cellplan.errors import InputError, NotVerifiedError
 from cellplan.model.report.exported import Promise
 from cellplan.model.report.verified_run import ACCESS_TOKEN
 from cellplan.model.settings.controllers import ControllerEntry, KindName, RobotControlEntry
+from cellplan.model.task.task import Service
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.export.choice import Choice, exported_robots
 from cellplan.programs.export.prepare import prepare
@@ -90,6 +92,18 @@ def test_two_robots_of_one_controller_are_synchronised(run: VerifiedRun) -> None
 
     assert promise.promise is Promise.SYNCHRONISED
     assert promise.reasons == ("not timed: in-step programs cannot state it",)
+
+
+def test_programs_without_times_say_that_they_do_not_wait_while_a_tool_is_cleaned(run: VerifiedRun) -> None:
+    one = on_controllers(run, controllers("c"), left="c", right="c", idle="c")
+    service = Service(posture=np.zeros(6), takes=8.0, most=1)
+    tasks = tuple(replace(it, via_before=(None, service)) if it.robot == "right" else it for it in one.cell.tasks)
+    robots = tuple(replace(it, service=service if it.name == "right" else None) for it in one.cell.robots)
+    cleaned = replace(one, cell=replace(one.cell, tasks=tasks, robots=robots), token=ACCESS_TOKEN)
+
+    line = "no wait is written for the 8 s in which the tool of 'right' is cleaned"
+    assert [line in it for it in choose_promise(cleaned, IN_STEP, EVERY).remarks] == [False, True]
+    assert not any("is cleaned" in it for it in choose_promise(cleaned, CSV, EVERY).remarks)
 
 
 @pytest.mark.parametrize(

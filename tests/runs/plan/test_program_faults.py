@@ -76,6 +76,22 @@ def test_a_home_that_collides_is_refused_by_its_key(tmp_path: Path) -> None:
     assert str(error).endswith(": give another home_deg")
 
 
+@pytest.mark.parametrize("key", ["via: {before: [home, POSTURE]}", "via: {after: [service]}"])
+def test_postures_in_which_a_robot_touches_its_pedestal_are_refused_by_their_keys(key: str, tmp_path: Path) -> None:
+    posture = "[7.426416495712, 90, 0, 26.231452660417, 82.573583504285, 90]"
+    text = ONE_TASK.replace("    path:", f"    {key}\n    path:".replace("POSTURE", posture))
+    place = "tasks.seam.via.before[1]"
+    if "service" in key:
+        place, home = "robots.pen.service.at", "    home_deg: [7.4"
+        text = text.replace(home, f"    service: {{at: {posture}, takes_s: 2, every: {{seams: 1}}}}\n{home}")
+
+    error = refused(text, tmp_path)
+
+    assert type(error) is InputError
+    assert f": {place}: 'pen' comes too close there: 'pen/" in str(error)
+    assert "touches 'pen/pedestal'" in str(error)
+
+
 def test_a_robot_without_tasks_stands_at_a_home_near_a_start_that_is_found(tmp_path: Path) -> None:
     file = tmp_path / "cell.yaml"
     idle = "  idle:\n    model: ur5e\n    base: {xyz_mm: [-1500, 0, 0]}\npart:\n"
