@@ -34,7 +34,7 @@ def written_cell(draft: AssignmentDraft, instance: Instance, sequenced: Sequence
             if end is not None:
                 values |= task_values(draft.cell, end, before, _holder(instance, station))
                 values |= {f"tasks.{end.mode.task}.holder_moves": True} if station in instance.columns else {}
-                values |= {f"tasks.{end.mode.task}.via": {"before": ["service"]}} if end.mode.robot in cleaned else {}
+                values |= via_values(draft.cell, end.mode.task, is_cleaned=end.mode.robot in cleaned)
         before = block
     return draft.cell.with_values(values | order_values(sequenced, instance.step))
 
@@ -65,6 +65,17 @@ def task_values(cell: Cell, end: End, before: tuple[str, ...], holder: tuple[str
     if after := tuple(dict.fromkeys((*task.after, *before))):
         values[f"{place}.after"] = after
     return values | ((backwards_values(cell, task.name) or {}) if end.is_reversed else {})
+
+
+def via_values(cell: Cell, task: str, *, is_cleaned: bool) -> dict[str, object]:
+    """Via points of a task by address, its tool cleaned first or not at all; nothing where they stay as written."""
+    tasks: Any = cell.origin.document["tasks"]
+    written = tasks[task].get("via") or {}
+    points = {key: [it for it in written.get(key, ()) if it != "service"] for key in ("before", "after")}
+    if not is_cleaned and points == {key: [*written.get(key, ())] for key in points}:
+        return {}
+    points["before"] = [*(["service"] if is_cleaned else []), *points["before"]]
+    return {f"tasks.{task}.via": {key: it for key, it in points.items() if it} or None}
 
 
 def backwards_values(cell: Cell, task: str) -> dict[str, object] | None:

@@ -104,6 +104,37 @@ def test_what_a_task_states_is_kept(assignment: Assignment, tmp_path: Path) -> N
     assert result.passed
 
 
+def test_via_points_are_passed_as_the_model_has_them_and_services_are_chosen_again(tmp_path: Path) -> None:
+    """The written cell, assigned once more without its orders, is the same."""
+    service = "    service: {at: [-60, -60, 60, 0, 60, 0], takes_s: 8, every: {seams: 3}}\n"
+    text = OPEN.read_text().replace("    home_deg", f"{service}    home_deg")
+    for name, via in (
+        ("top_1", "robot: any\n    via: {before: [home], after: [home]}"),
+        (
+            "edge_2",
+            "robot: west\n    via: {before: [home, [-40, -50, 60, 0, 60, 0]], after: [[10, -50, 60, 0, 60, 0]]}",
+        ),
+    ):
+        text = text.replace(f"  {name}:\n    robot: any", f"  {name}:\n    {via}")
+    (tmp_path / "cell.yaml").write_text(text)
+
+    result = assign(AssignmentDraft.load(tmp_path / "cell.yaml"), effort=1)
+
+    write_assignment(result, tmp_path / "cell.yaml", tmp_path / "out")
+    written = (tmp_path / "out" / "best.yaml").read_text()
+    (tmp_path / "again.yaml").write_text("".join(it for it in written.splitlines(True) if "    order:" not in it))
+    again = assign(AssignmentDraft.load(tmp_path / "again.yaml"), effort=1)
+    via = {task.name: (len(task.via_before), len(task.via_after)) for task in result.cell.tasks}
+    assert result.passed
+    assert result.bound is not None
+    assert result.bound <= result.model_cycle <= result.cycle <= 1.005 * result.model_cycle
+    assert result.sequenced.schedule.cleaned(result.instance).count(frozenset()) < len(result.sequenced.schedule.blocks)
+    assert via["top_1"] in {(1, 1), (2, 1)}
+    assert via["edge_2"] in {(2, 1), (3, 1)}
+    assert again.cycle == result.cycle
+    assert {task.name: (len(task.via_before), len(task.via_after)) for task in again.cell.tasks} == via
+
+
 def test_a_robot_less_is_never_faster(assignment: Assignment) -> None:
     instance = assignment.instance
 

@@ -12,6 +12,7 @@ from cellplan.measures.weld_position import torch_angles, weld_angles
 from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.settings.task import TorchEntry, WeldPositionEntry
 from cellplan.model.task.clocked_path import ClockedPath, demanded_spans, fixed_rests
+from cellplan.model.task.task import Service, ViaPoint
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths
@@ -40,6 +41,8 @@ class TaskGoal:
     is_spin_free: bool = True  # whether the tool may be turned about its axis beside what is written
     path_values: tuple[tuple[str, object], ...] = ()  # with which its path begins elsewhere, by address in a cell file
     stand_off_steps: int | None = None  # of the steps where it is retimed, those of approach and retraction
+    via_before: tuple[Array | None, ...] = ()  # what its robot passes on its way to it, shape (n,) each; None for home
+    via_after: tuple[Array | None, ...] = ()  # likewise on its way from it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,9 +135,16 @@ def task_goals(cell: Cell, robots: Mapping[str, Sequence[str]]) -> list[TaskGoal
                 after=task.after,
                 torch=task.torch,
                 weld_position=task.weld_position,
+                via_before=_without_services(task.via_before),
+                via_after=_without_services(task.via_after),
             )
         )
     return goals
+
+
+def _without_services(points: Sequence[ViaPoint]) -> tuple[Array | None, ...]:
+    """Via points but services, which an assignment chooses."""
+    return tuple(it for it in points if not isinstance(it, Service))
 
 
 def _seconds(cell: Cell, path: ClockedPath) -> float:

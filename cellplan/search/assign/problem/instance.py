@@ -38,12 +38,15 @@ class End:
         return self.mode.q[0 if self.is_reversed else -1]
 
 
-CLEANED: Final = "is cleaned"  # no task has such a name: names have no spaces
-READY: Final = "is ready"
+COMES: Final = "comes to it"  # at a via point; no task has such a name: names have no spaces
+READY: Final = "is ready"  # for its task, while others pass via points before theirs
+LEAVES: Final = "leaves it"
+DONE: Final = "is done"
+SIDES: Final = {COMES: -1, READY: -1, LEAVES: 1, DONE: 1}  # before its task, or after it
 
 
 def standing(robot: str, q: Array, why: str) -> End:
-    """A configuration in which a robot stands before a task."""
+    """A configuration in which a robot stands before a task or after it."""
     mode = TaskMode(task=why, robot=robot, station=-1, spin=0.0, q=np.stack([q, q]), margin=0.0)
     return End(mode=mode, is_reversed=False)
 

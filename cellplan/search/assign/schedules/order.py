@@ -14,7 +14,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.search.assign.problem.goals import TaskGoal
-from cellplan.search.assign.problem.instance import CLEANED, READY, End, Instance, standing
+from cellplan.search.assign.problem.instance import COMES, DONE, LEAVES, READY, SIDES, End, Instance, standing
 from cellplan.search.assign.problem.table import Key
 from cellplan.search.assign.schedules.schedule import BlockSchedule, in_order
 
@@ -24,6 +24,7 @@ TOURS: Final = 4  # shortest ones that are tried
 MOST_KNOWN: Final = 200  # pairs of blocks of which the transfers are kept, up to 1.5 MB each
 
 Stop = tuple[int | None, tuple[End | None, ...]]  # station, and the end of each operator's task; None at home
+Passed = Mapping[str, Array]  # configurations in [rad] or [m] of the operators that are at via points, shape (n,) each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,12 +62,11 @@ class Layer:
             coming.append(np.array([end.begin for end in modes] or [instance.homes[robot]]))
         return cls(station=station, ends=ends, leaving=leaving, coming=coming, longer=longer(instance, ends))
 
-    def preceding(self, instance: Instance, cleaned: Collection[str]) -> Self:
-        """Where the operators stand before the block while tools are cleaned: for that, or ready for their tasks."""
-        both = zip(instance.robots, self.ends, strict=True)
+    def passing(self, instance: Instance, points: Passed, *, leaves: bool) -> Self:
+        """Where the operators stand before the block, or after it, while some of them are at via points."""
         ends = [
-            [standing_before(instance, robot, it, cleaned) for it in (choices[:1] if robot in cleaned else choices)]
-            for robot, choices in both
+            [standing_at(robot, it, points, leaves=leaves) for it in (choices[:1] if robot in points else choices)]
+            for robot, choices in zip(instance.robots, self.ends, strict=True)
         ]
         at = [
             np.array([instance.homes[robot] if end is None else end.begin for end in choices])
@@ -122,19 +122,14 @@ class Sequencer:
     instance: Instance
     refusals: list[Refusal] = field(default_factory=list)
     _layers: dict[frozenset[Key], Layer] = field(default_factory=dict)
-    _before: dict[tuple[Layer, frozenset[str]], Layer] = field(default_factory=dict)
+    _passing: dict[tuple[Layer, frozenset[str]], list[Layer]] = field(default_factory=dict)  # before, in and after it
     _known: dict[tuple[Layer, Layer], tuple[int, Indices]] = field(default_factory=dict)  # and refusals in them
 
     def sequenced(self, schedule: BlockSchedule) -> SequencedBlocks:
         """The blocks in their order with the modes and directions that take least time."""
         layers = [self._at_home]
         for block, cleaned in zip(schedule.blocks, schedule.cleaned(self.instance), strict=True):
-            layer = self._layer(schedule, block)
-            if cleaned:
-                if (layer, cleaned) not in self._before:
-                    self._before[layer, cleaned] = layer.preceding(self.instance, cleaned)
-                layers.append(self._before[layer, cleaned])
-            layers.append(layer)
+            layers += self._around(self._layer(schedule, block), {schedule.chosen[it][0]: it for it in block}, cleaned)
         layers.append(self._at_home)
         cost, back, costs = np.zeros([1] * len(self.instance.robots), dtype=np.int64), [], []
         for before, after in pairwise(layers):
@@ -148,7 +143,7 @@ class Sequencer:
             moved.append(int(cost[place]))
             stops.append((after.station, tuple(it[k] for it, k in zip(after.ends, place, strict=True))))
             place = tuple(int(k) for k in np.unravel_index(came[place], before.shape))
-        blocks = [(it, to) for it, to in zip(stops[:0:-1], moved[:0:-1], strict=True) if not is_preceding(it[1])]
+        blocks = [(it, to) for it, to in zip(stops[:0:-1], moved[:0:-1], strict=True) if not side_of(it[1])]
         waits = waits_of(self.instance, schedule, [to for _, to in blocks])
         steps = schedule.work(self.instance) + moved[0] + sum(waits)
         return SequencedBlocks(schedule=schedule, stops=tuple(it for it, _ in blocks), steps=steps, waits=waits)
@@ -175,6 +170,17 @@ class Sequencer:
             self._layers[keys] = Layer.of(self.instance, schedule.station_of(block), at_work)
         return self._layers[keys]
 
+    def _around(self, layer: Layer, at_work: Mapping[str, str], cleaned: frozenset[str]) -> list[Layer]:
+        """The choices in a block, and at the via points before and after it."""
+        if (layer, cleaned) not in self._passing:
+            coming, leaving = passes(self.instance, at_work, cleaned)
+            self._passing[layer, cleaned] = [
+                *(layer.passing(self.instance, points, leaves=False) for points in coming),
+                layer,
+                *(layer.passing(self.instance, points, leaves=True) for points in leaving),
+            ]
+        return self._passing[layer, cleaned]
+
     def _transfers(self, before: Layer, after: Layer) -> Indices:
         """Steps between every joint choice of two layers, shape (*before.shape, *after.shape)."""
         count, steps = self._known.pop((before, after), (0, None))
@@ -191,11 +197,13 @@ class Sequencer:
     def _straight(self, before: Layer, after: Layer) -> Indices:
         """Likewise, of transfers that are free straight."""
         steps: Indices = np.zeros((*before.shape, *after.shape), dtype=np.int32)
-        firsts = [ends[0] for ends in before.ends]
-        steps += 0 if is_preceding(firsts) else self.instance.station_steps(before.station, after.station)
+        firsts, lasts = ([ends[0] for ends in it.ends] for it in (before, after))
+        goes_on = side_of(firsts) >= 0 and side_of(lasts) <= 0
+        steps += self.instance.station_steps(before.station, after.station) if goes_on else 0
         for axis, robot in enumerate(self.instance.robots):
             table = self.instance.transfer_steps(robot, before.leaving[axis][:, None], after.coming[axis][None])
-            if (first := firsts[axis]) is not None and first.mode.task == READY:
+            first, last = (None if it is None else it.mode.task for it in (firsts[axis], lasts[axis]))
+            if first == READY or last == DONE:
                 table = np.where(table > 0, CROWDED, 0)  # it stays where it is
             shape = [1] * steps.ndim
             shape[axis], shape[axis + len(before.shape)] = table.shape
@@ -247,26 +255,53 @@ class Sequencer:
         return tuple(order)
 
 
-def standing_before(instance: Instance, robot: str, end: End | None, cleaned: Collection[str]) -> End | None:
-    """Where a robot stands before a block while tools are cleaned: for that, or ready for its task; None at home."""
-    if robot in cleaned:
-        return standing(robot, instance.rules.services[robot].q, CLEANED)
-    return None if end is None else standing(robot, end.begin, READY)
+def passes(
+    instance: Instance, at_work: Mapping[str, str], cleaned: Collection[str]
+) -> tuple[list[Passed], list[Passed]]:
+    """The via points before a block and after it, place by place; operators without one there stand.
+
+    Args:
+        at_work: Tasks by operator.
+        cleaned: Operators whose tools are cleaned on the way to the block.
+    """
+    before, after = dict[str, list[Array]](), dict[str, list[Array]]()
+    for robot, task in at_work.items():
+        goal, home = instance.goals[task], instance.homes[robot]
+        service = [instance.rules.services[robot].q] if robot in cleaned else []
+        before[robot] = [*service, *(home if it is None else it for it in goal.via_before)]
+        after[robot] = [home if it is None else it for it in goal.via_after]
+    coming, leaving = (range(max(map(len, it.values()), default=0)) for it in (before, after))
+    return (
+        [{robot: points[place] for robot, points in before.items() if place < len(points)} for place in coming],
+        [{robot: points[: place + 1][-1] for robot, points in after.items() if points} for place in leaving],
+    )
+
+
+def standing_at(robot: str, end: End | None, points: Passed, *, leaves: bool) -> End | None:
+    """Where an operator stands before its task or after it: at a via point, or ready or done; None at home."""
+    if robot in points:
+        return standing(robot, points[robot], LEAVES if leaves else COMES)
+    if end is None:
+        return None
+    return standing(robot, end.end, DONE) if leaves else standing(robot, end.begin, READY)
 
 
 def all_stops(instance: Instance, sequenced: SequencedBlocks) -> Iterator[Stop]:
-    """The stops of a sequence, and before them where robots stand while tools are cleaned."""
-    cleaned = sequenced.schedule.cleaned(instance)
-    for (station, ends), robots in zip(sequenced.stops, cleaned, strict=True):
-        if robots:
-            both = zip(instance.robots, ends, strict=True)
-            yield station, tuple(standing_before(instance, robot, end, robots) for robot, end in both)
+    """The stops of a sequence, and before and after them where robots stand while some are at via points."""
+    for (station, ends), cleaned in zip(sequenced.stops, sequenced.schedule.cleaned(instance), strict=True):
+        at_work = {end.mode.robot: end.mode.task for end in ends if end is not None}
+        coming, leaving = passes(instance, at_work, cleaned)
+        both = list(zip(instance.robots, ends, strict=True))
+        for points in coming:
+            yield station, tuple(standing_at(robot, end, points, leaves=False) for robot, end in both)
         yield station, ends
+        for points in leaving:
+            yield station, tuple(standing_at(robot, end, points, leaves=True) for robot, end in both)
 
 
-def is_preceding(ends: Sequence[End | None]) -> bool:
-    """Whether robots stand so before a block."""
-    return any(end is not None and end.mode.task in (CLEANED, READY) for end in ends)
+def side_of(ends: Sequence[End | None]) -> int:
+    """Whether robots are on their way to a block, -1, or from it, 1; or at work in it or at home, 0."""
+    return next((SIDES[end.mode.task] for end in ends if end is not None and end.mode.task in SIDES), 0)
 
 
 def longer(instance: Instance, ends: Sequence[Sequence[End | None]]) -> Indices:

@@ -17,7 +17,7 @@ from cellplan.planning.transfer.straight_moves import StraightMoves
 from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.problem.instance import Instance
-from cellplan.search.assign.schedules.order import Refusal, SequencedBlocks, Sequencer, Stop, all_stops, is_preceding
+from cellplan.search.assign.schedules.order import Refusal, SequencedBlocks, Sequencer, Stop, all_stops, side_of
 from cellplan.search.assign.schedules.schedule import BlockSchedule, refuse_impossible
 
 MOST_TRIED: Final = 400  # orders of blocks, and tasks exchanged between them
@@ -168,7 +168,7 @@ class TransferCertifier:
         holder = sequencer.instance.stations.holder
         if station is not None and holder is not None:
             stations = sequencer.instance.stations
-            q[cell.columns(holder)] = (stations.left if leaves and not is_preceding(ends) else stations.q)[station]
+            q[cell.columns(holder)] = (stations.left if leaves + side_of(ends) > 0 else stations.q)[station]
         for robot, end in zip(sequencer.instance.robots, ends, strict=True):
             if end is not None:
                 q[cell.columns(robot)] = end.end if leaves else end.begin

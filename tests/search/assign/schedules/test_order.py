@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from builders.assignments import STEP, small_instance
 
+from cellplan.geometry.arrays import Array
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.search.assign.problem.durations import with_stand_offs
@@ -18,18 +19,40 @@ from cellplan.search.assign.schedules.schedule import BlockSchedule, in_order
 
 
 def steps_of(instance: Instance, schedule: BlockSchedule, picked: dict[str, End]) -> int:
-    """Steps from home to home with given modes, each transfer as slow as its slowest robot or the part."""
-    total, at, station = 0, dict(instance.homes), None
+    """Steps from home to home with given modes, each leg of a transfer as slow as its slowest robot or the part."""
+    total, at, station, before = 0, dict(instance.homes), None, ()
     for block in (*schedule.blocks, ()):
         total += max((steps_with(instance, picked[task]) for task in block), default=0)
         here = schedule.station_of(block) if block else None
         goals = {robot: instance.homes[robot] for robot in instance.robots}
         goals |= {schedule.chosen[task][0]: picked[task].begin for task in block}
-        moves = [int(instance.transfer_steps(robot, at[robot], goal)) for robot, goal in goals.items()]
-        total += max([*moves, instance.station_steps(station, here)])
-        at = goals | {schedule.chosen[task][0]: picked[task].end for task in block}
-        station = here
+        legs = [(leg, station) for leg in over(instance, schedule, before, at, is_after=True)]
+        legs += [(leg, here) for leg in over(instance, schedule, block, goals, is_after=False)]
+        for goal, place in (*legs, (goals, here)):
+            moves = [int(instance.transfer_steps(robot, at[robot], q)) for robot, q in goal.items()]
+            total += max([*moves, instance.station_steps(station, place) if place != station else 0])
+            at, station = goal, place
+        at, before = goals | {schedule.chosen[task][0]: picked[task].end for task in block}, block
     return total
+
+
+def over(
+    instance: Instance, schedule: BlockSchedule, block: tuple[str, ...], q: dict[str, Array], *, is_after: bool
+) -> list[dict[str, Array]]:
+    """Where all robots stand while those of a block are at their via points: at the last one, or where they go."""
+    legs = list[dict[str, Array]]()
+    for place in range(3):
+        leg = dict(legs[-1] if legs and is_after else {name: q[name] for name in instance.robots})
+        for task in block:
+            goal, robot = instance.goals[task], schedule.chosen[task][0]
+            points = goal.via_after if is_after else goal.via_before
+            if place < len(points):
+                leg[robot] = instance.homes[robot] if (point := points[place]) is None else point
+        legs.append(leg)
+    most = max(
+        (len(getattr(instance.goals[it], f"via_{'after' if is_after else 'before'}")) for it in block), default=0
+    )
+    return legs[:most]
 
 
 def steps_with(instance: Instance, end: End) -> int:
@@ -42,11 +65,25 @@ def steps_with(instance: Instance, end: End) -> int:
     return with_stand_offs(process, {key: [end.mode]}, instance.bounds, instance.step).steps
 
 
-@pytest.mark.parametrize("is_retimed", [False, True])
+@pytest.mark.parametrize("kind", ["as written", "retimed", "via points"])
 @pytest.mark.parametrize("seed", range(4))
-def test_no_choice_of_modes_is_faster(seed: int, is_retimed: bool) -> None:
+def test_no_choice_of_modes_is_faster(seed: int, kind: str) -> None:
     instance = small_instance(seed, 5, modes=2)
-    if is_retimed:
+    if kind == "via points":
+        a, b, c = np.array([[0.7, -0.4], [-0.6, 0.2], [1.0, 0.9]])
+        points = {
+            "t0": ((None, a), (b,)),
+            "t1": ((), (c, None)),
+            "t2": ((c,), ()),
+            "t3": ((), ()),
+            "t4": ((a, b), (c,)),
+        }
+        stated = {
+            name: replace(goal, via_before=points[name][0], via_after=points[name][1])
+            for name, goal in instance.goals.items()
+        }
+        instance = replace(instance, goals=stated)
+    if kind == "retimed":
         timed = {
             name: with_stand_offs(goal, instance.modes, instance.bounds, instance.step)
             for name, goal in instance.goals.items()
