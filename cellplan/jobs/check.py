@@ -29,7 +29,7 @@ from cellplan.runs.plan.given_starts import with_chosen_start, with_placed_start
 from cellplan.runs.plan.program_faults import (
     refuse_hanging_parts,
     refuse_sunk_parts,
-    refuse_touching_postures,
+    refuse_touching_configurations,
     refuse_unnamed_supports,
 )
 from cellplan.runs.plan.start import chosen_start, depths_on_paths
@@ -75,7 +75,7 @@ def _check_program(cell: Cell, progress: Progress) -> CellCheck:
     refuse_sunk_parts(scenes)
     refuse_hanging_parts(scenes)
     refuse_unnamed_supports(scenes)
-    refuse_touching_postures(scenes.held)
+    refuse_touching_configurations(scenes.held)
     made = {
         stage.phase.name: _check_together(scenes.of_stage(stage), progress) for stage in blocks if stage.move is None
     }

@@ -17,7 +17,7 @@ from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Mode, Robot, Timing
 from cellplan.model.robot.robot import configuration_in_si, start_keys
 from cellplan.model.settings.assign import POSTURE_LIMIT, AssignEntry
-from cellplan.runs.plan.program_faults import refuse_crowded_homes, refuse_touching_postures
+from cellplan.runs.plan.program_faults import refuse_crowded_homes, refuse_touching_configurations
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.problem.goals import Stations, task_goals
 from cellplan.search.assign.problem.reach import places_in_reach
@@ -62,7 +62,7 @@ class AssignmentDraft:
         draft.stations()  # these and the homes are refused before anything is searched
         scene = Scene.from_cell(cell)
         refuse_crowded_homes(scene, draft.home)
-        refuse_touching_postures(scene)
+        refuse_touching_configurations(scene)
         return draft
 
     def without(self, tasks: Sequence[str]) -> "AssignmentDraft | None":

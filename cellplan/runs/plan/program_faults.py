@@ -142,24 +142,23 @@ def refuse_crowded_homes(scene: Scene, home: Array) -> None:
     )
 
 
-def refuse_touching_postures(scene: Scene) -> None:
+def refuse_touching_configurations(scene: Scene) -> None:
     """Refuse services and via points in which a robot comes too close to itself or to what does not move.
 
     Raises:
         InputError: With the bodies and their distance.
     """
     cell, alone = scene.cell, scene_of_run(scene, ())
-    postures = [(f"robots.{it.name}.service.at", it.name, it.service.posture) for it in cell.robots if it.service]
+    given = [(f"robots.{it.name}.service.at", it.name, it.service.posture) for it in cell.robots if it.service]
     for task in cell.tasks:
         for key, points in (("before", task.via_before), ("after", task.via_after)):
-            places = (f"tasks.{task.name}.via.{key}[{index}]" for index in range(len(points)))
-            both = zip(places, points, strict=True)
-            postures += [(place, task.robot, it) for place, it in both if isinstance(it, np.ndarray)]
+            stated = (it for it in enumerate(points) if isinstance(it[1], np.ndarray))
+            given += [(f"tasks.{task.name}.via.{key}[{index}]", task.robot, q) for index, q in stated]
     moved = {robot.name: set(rows_moved_by(alone, robot.name)) for robot in cell.robots}
-    for place, robot, posture in postures:
+    for place, robot, at in given:
         others = set[int]().union(*(rows for name, rows in moved.items() if name != robot))
         by_itself, q = scene_of_rows(alone, sorted(moved[robot] - others)), np.zeros((2, cell.joint_count))
-        q[:, cell.columns(robot)] = posture
+        q[:, cell.columns(robot)] = at
         if not certify(by_itself, q, with_minimum=False).is_met:
             words = nearest_words(by_itself, q)[0]
             raise InputError(f"{cell.origin.at(place)}: '{robot}' comes too close there: {words}: give another one")

@@ -36,7 +36,7 @@ from cellplan.runs.plan.program_faults import (
     refuse_crowded_homes,
     refuse_hanging_parts,
     refuse_sunk_parts,
-    refuse_touching_postures,
+    refuse_touching_configurations,
     refuse_unnamed_supports,
 )
 from cellplan.runs.plan.retiming import transfer_retimer
@@ -92,7 +92,7 @@ def plan_work(cell: Cell, *, near: Branches | None = None, progress: Progress = 
     refuse_sunk_parts(scenes)
     refuse_hanging_parts(scenes)
     refuse_unnamed_supports(scenes)
-    refuse_touching_postures(scenes.held)
+    refuse_touching_configurations(scenes.held)
     search = WorkedStages(cell, scenes, progress, near)
     runs = search.runs()
     started = search.cell
