@@ -152,8 +152,9 @@ def refuse_touching_configurations(scene: Scene) -> None:
     given = [(f"robots.{it.name}.service.at", it.name, it.service.posture) for it in cell.robots if it.service]
     for task in cell.tasks:
         for key, points in (("before", task.via_before), ("after", task.via_after)):
-            stated = (it for it in enumerate(points) if isinstance(it[1], np.ndarray))
-            given += [(f"tasks.{task.name}.via.{key}[{index}]", task.robot, q) for index, q in stated]
+            place = f"tasks.{task.name}.via.{key}"
+            stated = ((index, it) for index, it in enumerate(points) if isinstance(it, np.ndarray))
+            given += [(f"{place}[{index}]", task.robot, at) for index, at in stated]
     moved = {robot.name: set(rows_moved_by(alone, robot.name)) for robot in cell.robots}
     for place, robot, at in given:
         others = set[int]().union(*(rows for name, rows in moved.items() if name != robot))
