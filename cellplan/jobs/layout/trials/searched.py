@@ -71,11 +71,10 @@ def refuse_unsearchable(request: LayoutRequest, cell: Cell) -> None:
     for address in [*branches, *(f"robots.{path.robot}.path" for path in layout.paths)]:
         raise InputError(f"{vary}: expected no branch and no joint path with a program, got {address}; leave it out")
     for variable in layout.ranges:
-        is_other_start = variable.kind is VariableKind.START and variable.name not in cell.positioners[:1]
-        if is_other_start or variable.kind is VariableKind.GRASP:
+        if variable.kind is VariableKind.START and variable.name not in cell.positioners[:1]:
             raise InputError(
-                f"{vary}: expected no grasps, and no starts but that of the first holder, with a program, got "
-                f"{variable.address}; leave it out"
+                f"{vary}: expected no starts but that of the first holder with a program, got {variable.address}; "
+                "leave it out"
             )
 
 
