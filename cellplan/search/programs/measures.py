@@ -67,10 +67,11 @@ class Measures:
     @classmethod
     def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":
         """Measure a point."""
-        times, limits, beyond = problem.times, problem.limits, demands.beyond
+        times, limits, beyond, transfers = problem.times, problem.limits, demands.beyond, problem.transfers
         span = float(times[-1] - times[0])
         pace = Pace.of(problem, point) if demands.timing is CycleTiming.RETIMED else None
         speeds, accelerations, factor = _loads(problem, point) if pace is None else _paced(problem, point, pace)
+        jerky = 0.0 if pace is None else transfers.window * len(pace.stretches)
         most = demands.clearance + (0.0 if beyond is None else float(beyond.max(initial=0.0)))
         distances = problem.distances(point, key_nodes(problem, effort), effort.within + most)
         added = np.where(distances.within_robot, 0.0, demands.clearance)
@@ -91,7 +92,7 @@ class Measures:
             violations=distances.demands + added - distances.values,
             within=effort.within,
             factor=factor,
-            cycle=_work(demands, factor, span) + problem.transfers.seconds(point.x, point.q),
+            cycle=_work(demands, factor, span) + jerky + transfers.seconds(point.x, point.q),
             span=span,
             arms=arms,
             singular=PeakValues.of(times, _missing(arms, demands, len(times))),

@@ -47,6 +47,7 @@ class Transfers:
     stays: Array  # time in [s] for which all robots stand in each transfer, shape (R,)
     bodies: tuple[CellDistances, ...]  # the bodies during each leg
     detours: Array  # by how many times longer each transfer takes where bodies are deep in each other, shape (R,)
+    window: float = 0.0  # time in [s] that limits of jerk add to a retimed stretch of a motion, from rest to rest
 
     @classmethod
     def none(cls, joints: int, *, nodes: int) -> "Transfers":

@@ -11,7 +11,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.cell.layout import VariableKind
 from cellplan.planning.sequence.stages import Stage, program_stages
-from cellplan.runs.plan.retiming import transfer_retimer
+from cellplan.runs.plan.retiming import joint_bounds, transfer_retimer
 from cellplan.runs.plan.sequence import Pass, PlannedProgram, PlannedStage, plan_work, via_points
 from cellplan.runs.solution import Solution
 from cellplan.search.distances.cell_distances import CellDistances
@@ -26,6 +26,7 @@ from cellplan.search.variables.written import written_start, written_task_start
 
 SAME: Final = 1e-4  # [rad] or [m] within which a home that is found is the start of a phase
 NODE: Final = 1e6  # [rad] or [m] beyond any joint: what is added to the number of a node in place of a configuration
+WINDOW: Final = 2.0  # [-] times that the jerk takes to the full acceleration: from speeding up to braking at once
 FEWER: Final = 4  # [-] times fewer nodes of a straight move that grips or puts down the part
 
 
@@ -173,6 +174,7 @@ class ProgramPhases:
             step=retimer.step,
             stays=np.array([sum(stays for _, stays in stops) for stops in passed]),
             detours=np.array(self.detours or [1.0] * len(passed)),
+            window=WINDOW * joint_bounds(cell).build_up,
         )
 
 

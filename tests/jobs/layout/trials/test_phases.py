@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 from builders.home_to_home import PICK_AND_PLACE
 
+from cellplan.jobs.layout.given_layout import given_program
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.trials.prepared import PreparedSearch, prepared
 from cellplan.planning.sequence.stages import program_stages
 from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.runs.plan.retiming import transfer_retimer
 from cellplan.runs.plan.sequence import via_points
+from cellplan.search.programs.measures import Measures
+from cellplan.search.programs.objective import Effort
 from cellplan.search.programs.program_problem import ProgramProblem
 from cellplan.search.programs.transfers import NORM
 
@@ -93,3 +96,21 @@ def test_detours_of_a_planned_program_are_those_of_whole_transfers(ready: Prepar
     learned = transfers.learned(point.x, point.q, seconds.tolist())
 
     assert learned.seconds(point.x, point.q) == pytest.approx(seconds.sum())
+
+
+@pytest.mark.slow
+def test_the_work_of_a_retimed_program_takes_about_as_long_as_its_estimate(tmp_path: Path) -> None:
+    path = tmp_path / "cell.yaml"
+    path.write_text(PICK_AND_PLACE)
+    ready = prepared(LayoutRequest(cell=path, settings=("motion.timing=fastest", "motion.step_s=0.004")))
+    problem = ready.coarse
+    assert isinstance(problem, ProgramProblem)
+    point = problem.evaluate(problem.given, ready.given_start)
+    assert point is not None
+    measures = Measures.of(problem, point, ready.demands(), Effort(keys=3))
+    runs = given_program(ready).solution.runs
+
+    estimate = measures.cycle - problem.transfers.seconds(point.x, point.q)
+
+    true = sum(run.report.cycle_time for run in runs if run.phase.tasks)
+    assert estimate == pytest.approx(true, rel=0.1)
