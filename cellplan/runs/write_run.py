@@ -1,6 +1,7 @@
 """Write a solution: report, plots, the resolved cell and, when every check passed, the joint tables."""
 
 from collections.abc import Collection, Mapping
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Final
@@ -89,12 +90,15 @@ def write_run(
     return records.whole
 
 
+_version = cache(version)
+
+
 def versions() -> dict[str, str]:
     """Version of cellplan and of every engine, by package name."""
     packages = {"cellplan": cellplan.__version__}
     for package in ENGINES:
         try:
-            packages[package] = version(package)
+            packages[package] = _version(package)
         except PackageNotFoundError:
             packages[package] = "unknown"
     return packages

@@ -3,6 +3,7 @@
 import re
 import unicodedata
 from collections.abc import Collection, Iterable, Mapping
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 from cellplan.errors import InputError
@@ -41,19 +42,24 @@ def safe_names(names: Iterable[str], *, longest: int, reserved: Collection[str] 
 
     The order of the names decides, and words of the language, in any case, are reserved.
     """
-    taken = {word.lower() for word in reserved}
-    chosen: dict[str, str] = {}
+    words, taken, chosen = _lower_case(frozenset(reserved)), set[str](), dict[str, str]()
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", ascii_text(name)).strip("_") or "x"
         plain = plain if plain[0].isalpha() else f"p_{plain}"
         safe_name, number = plain[:longest], 1
-        while safe_name.lower() in taken:
+        while safe_name.lower() in taken or safe_name.lower() in words:
             number += 1
             ending = f"_{number}"
             safe_name = plain[: longest - len(ending)] + ending
         taken.add(safe_name.lower())
         chosen[name] = safe_name
     return chosen
+
+
+@lru_cache(maxsize=8)
+def _lower_case(words: frozenset[str]) -> frozenset[str]:
+    """Words of a language, of which RAPID has twenty thousand, in small letters."""
+    return frozenset(word.lower() for word in words)
 
 
 def joined(lines: Iterable[str], *, line_end: str = "\n") -> str:

@@ -21,7 +21,7 @@ class ScrewChain:
     def __init__(self, robot: Robot) -> None:
         """Take the joint axes at the reference configuration, followers after driven joints."""
         model = robot.model
-        self._axes = model.axes
+        self._axes, self._factors = model.axes, [_screw_factors(axis) for axis in model.axes]
         self._order = model.carried_order
         self._drives = [model.drive(link) for link in range(len(self._axes))]
         self._flange_link, self._links_to_flange = model.flange_link, model.links_to_flange
@@ -51,7 +51,7 @@ class ScrewChain:
         positions = self._positions(q)
         for link in self._order:
             axis = self._axes[link]
-            D[link + 1] = _carried_on(axis, positions[link], D[axis.parent + 1])[0]
+            D[link + 1] = _carried_on(axis, self._factors[link], positions[link], D[axis.parent + 1])[0]
         D.setflags(write=False)
         displacements = np.moveaxis(D, 0, 1)
         if len(q) <= CACHED_ROWS:
@@ -88,7 +88,7 @@ class ScrewChain:
         positions = self._positions(q)
         for link in self._links_to_flange:
             axis, drive = self._axes[link], self._drives[link]
-            D, s, s0 = _carried_on(axis, positions[link], D)
+            D, s, s0 = _carried_on(axis, self._factors[link], positions[link], D)
             if axis.is_revolute:
                 for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
                     screws[:, i, drive.joint] += drive.ratio * (s0[:, j] * s[:, k] - s0[:, k] * s[:, j])
@@ -119,13 +119,13 @@ def screw_displacement(axis: Joint | FollowerJoint, position: Array) -> Array:
     return pose_from(R, axis.point_B - R @ axis.point_B)
 
 
-def _carried_on(axis: Joint | FollowerJoint, position: Array, D: Array) -> tuple[Array, Array, Array]:
+def _carried_on(axis: Joint | FollowerJoint, factors: Array, position: Array, D: Array) -> tuple[Array, Array, Array]:
     """Displacements behind an axis, its direction and its point in the world, from the displacements D before it.
 
     With the matrix X of a unit screw ``A(q) = 1 + sin(q) X + (1 - cos(q)) X^2``, or ``1 + q X`` for a slide. What D
     gives with X, X^2, the direction and the point is one product for all configurations.
     """
-    carried = (D.reshape(-1, 4) @ _screw_factors(axis)).reshape(len(D), 4, 10)
+    carried = (D.reshape(-1, 4) @ factors).reshape(len(D), 4, 10)
     q = position[:, None, None]
     if axis.is_revolute:
         behind = D + np.sin(q) * carried[:, :, :4] + (1.0 - np.cos(q)) * carried[:, :, 4:8]

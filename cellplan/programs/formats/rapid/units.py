@@ -40,7 +40,7 @@ def zone_name(size: int) -> str:
 
 
 WORDS: Final = frozenset(_WORDS.split())  # of the language, and of what its controllers declare
-DECLARED_NAMES: Final = frozenset(  # of declarations and pages here, and of speeds and zones of the language
+RESERVED: Final = WORDS.union(  # and names of declarations and pages here, and of speeds and zones of the language
     {TASKS, SYNC_ON, SYNC_OFF, PART, FROM, ROWS, *map(zone_name, ZONES)}
     | {f"page_{number:03d}" for number in range(1, 1000)}
     | {f"{letter}{number}" for letter in "vz" for number in range(10_000)}
@@ -75,7 +75,7 @@ class PartFrame:
 
 def rapid_units(frame: ExportFrame) -> tuple[RapidUnit, ...]:
     """Robots of an export in the order of the cell; controllers and tasks must be such as the promise needs."""
-    modules = safe_names(frame.robots, longest=LONGEST_MODULE, reserved=WORDS | DECLARED_NAMES)
+    modules = safe_names(frame.robots, longest=LONGEST_MODULE, reserved=RESERVED)
     is_synchronised = frame.promise is Promise.SYNCHRONISED
     if is_synchronised:
         require_one_controller(frame)
