@@ -16,7 +16,7 @@ from hypothesis import settings
 ROOT = Path(__file__).resolve().parent.parent
 SESSION = "CELLPLAN_TEST_SESSION"  # folder that all processes of a session share
 QUICK_S, SLOW_S = 300, 1800  # [s] after which quick and slow tests count as hanging, on a busy machine too
-settings.register_profile("quick", max_examples=25, deadline=None, derandomize=True)
+settings.register_profile("quick", max_examples=15, deadline=None, derandomize=True)
 settings.register_profile("full", max_examples=200, deadline=None, derandomize=True)
 
 
@@ -58,6 +58,13 @@ def shared_solutions() -> Iterator[None]:
 def one_processor() -> Iterator[None]:
     """Commands do all in this process, whose solutions a session shares."""
     with mock.patch("cellplan.guard.forked.processors", return_value=1):
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def nothing_forced_to_disk() -> Iterator[None]:
+    """No file of a test has to outlive a loss of power, and waiting for the disk takes seconds."""
+    with mock.patch("os.fsync"):
         yield
 
 

@@ -45,7 +45,7 @@ def farthest_points(body: CollisionBody, directions: Array) -> Array:
     return np.concatenate([corners + body.inflation * directions, body.centre[None]])
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 12))])
 def test_points_bend_and_travel_no_more_than_the_joints_between_allow(seed: int) -> None:
     scene, motion, q = moving(seed, stride=0.2)
     rng = np.random.default_rng(seed)
@@ -79,7 +79,7 @@ def _seen_from_the_other(scene: Scene, q: Array, pair: tuple[int, int], *, step:
     return not free or max(free) - min(free) <= limit + 1e-4  # a measured distance is exact to 0.1 mm
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 8))])
 @pytest.mark.parametrize("stride", [0.01, 0.3])
 def test_what_one_reading_proves_holds_at_every_instant_of_every_step(seed: int, stride: float) -> None:
     scene, motion, q = moving(seed, stride=stride, samples=6)

@@ -19,7 +19,7 @@ from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.collision.distance import APART_TOL, measure
 from cellplan.scene.scene import Scene
 
-PLACEMENTS = 200
+PLACEMENTS = 80
 NEEDLE, WIRE = 0.5e-3, 0.25e-3  # [m] radii
 STEP = 2e-3  # [m] that the needle flies from sample to sample
 SAMPLES = 40

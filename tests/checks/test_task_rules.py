@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.uncertified import uncertified
 
 from cellplan.checks.joints.via_points import with_via_points
 from cellplan.files.cell.load import load_cell
@@ -27,7 +28,7 @@ VALUES: dict[str, object] = {
 def solved(values: dict[str, object], **rules: Any) -> Solution:
     """The cell with rules that are judged only, and not refused where no program keeps them."""
     cell = load_cell(FIXED).with_values({**VALUES, **values})
-    return solve(replace(cell, program=ProgramEntry(**rules)), is_reported=False)
+    return uncertified(replace(cell, program=ProgramEntry(**rules)))
 
 
 def checks_of(solution: Solution, name: str) -> list[tuple[str | None, Check]]:

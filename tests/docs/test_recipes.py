@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -179,6 +180,12 @@ def rows(recipe: str) -> dict[str, list[str]]:
     return {row["place"]: re.findall(r"`([^`]+)`", row["names"]) for row in ROW.finditer(RECIPES[recipe])}
 
 
+@cache
+def texts() -> dict[str, str]:
+    """The modules of the package by their places."""
+    return {path.relative_to(PACKAGE).as_posix(): path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
+
+
 def file_of(place: str) -> Path:
     return (
         ROOT / place if place.startswith(("benchmarks/", "cells/", "docs/", "pyproject", "tests/")) else PACKAGE / place
@@ -206,11 +213,7 @@ def test_the_places_of_a_recipe_exist_and_hold_the_names(recipe: str) -> None:
 
 @pytest.mark.parametrize("recipe", TRACES)
 def test_no_module_is_missing_from_a_recipe(recipe: str) -> None:
-    touched = {
-        path.relative_to(PACKAGE).as_posix()
-        for path in PACKAGE.rglob("*.py")
-        if re.search(TRACES[recipe], path.read_text(encoding="utf-8"))
-    }
+    touched = {name for name, text in texts().items() if re.search(TRACES[recipe], text)}
 
     assert touched <= set(rows(recipe))
 
@@ -297,17 +300,15 @@ def add_kind(copy: Path) -> None:
     insert(kinds, "OF_JOBS: Final = (", "TRAVELS, ")
 
 
-def copied(folder: Path) -> Path:
-    """A copy of the package."""
-    copy = folder / "cellplan"
-    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    return copy
+def copied(folder: Path, *ignored: str) -> Path:
+    """A copy of the package without files of some names."""
+    return Path(shutil.copytree(PACKAGE, folder / "cellplan", ignore=shutil.ignore_patterns(*ignored)))
 
 
 @pytest.mark.parametrize(("add", "most"), [(add_check, 3), (add_figure, 2), (add_kind, 5)])
 def test_an_addition_touches_few_files(add: Callable[[Path], None], most: int, tmp_path: Path) -> None:
     """Those of the package; a check and a figure have a row in the docs besides, a kind one in the import contracts."""
-    copy = copied(tmp_path)
+    copy = copied(tmp_path, "__pycache__")
 
     add(copy)
 
@@ -321,7 +322,7 @@ def test_an_addition_touches_few_files(add: Callable[[Path], None], most: int, t
 def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder with a copy of the package to which the recipes added all that they carry out, and with a run."""
     folder = tmp_path_factory.mktemp("extended")
-    copy = copied(folder)
+    copy = copied(folder)  # what is compiled goes with it
     for add in (add_method, add_check, add_format, add_figure, add_kind):
         add(copy)
     cell = (ROOT / "examples" / "plate.yaml").read_text(encoding="utf-8")

@@ -16,7 +16,10 @@ needs_posix = pytest.mark.skipif(os.name == "nt", reason="signals and limits are
 
 
 @needs_posix
-@pytest.mark.parametrize(("work", "how"), [("read_address_zero", "SIGSEGV"), ("abort", "SIGABRT")])
+@pytest.mark.parametrize(
+    ("work", "how"),
+    [("read_address_zero", "SIGSEGV"), pytest.param("abort", "SIGABRT", marks=pytest.mark.slow)],
+)
 def test_a_crash_is_one_line_that_names_the_signal(work: str, how: str) -> None:
     with pytest.raises(OverrunError) as caught:
         in_child(getattr(crashing_jobs, work), guard=READER)

@@ -147,10 +147,18 @@ WIDE = BaseGrid(x=(1000, 2600), y=(-600, 1000), step=400)
 RING = {"circle": {"radius_mm": 40, "center_mm": [110, -90], "plane": "xy"}, "project": "+z"}
 
 
-def test_a_program_of_one_block_has_the_map_of_the_block() -> None:
-    block = load_cell(CELL).with_values(SLOW)
+@pytest.fixture(scope="module")
+def block() -> Cell:
+    return load_cell(CELL).with_values(SLOW)
 
-    alone, program = (base_map(cell, "right", WIDE) for cell in (block, block.with_values({"program": {}})))
+
+@pytest.fixture(scope="module")
+def block_map(block: Cell) -> Any:
+    return base_map(block, "right", WIDE)
+
+
+def test_a_program_of_one_block_has_the_map_of_the_block(block: Cell, block_map: Any) -> None:
+    alone, program = block_map, base_map(block.with_values({"program": {}}), "right", WIDE)
 
     for one, other in zip(alone["places"], program["places"], strict=True):
         assert one["verdict"] == other["verdict"]
@@ -161,17 +169,21 @@ def test_a_program_of_one_block_has_the_map_of_the_block() -> None:
 
 
 @pytest.fixture(scope="module")
-def two_tasks() -> Cell:
-    block = load_cell(CELL).with_values(SLOW)
+def two_tasks(block: Cell) -> Cell:
     written: Any = block.origin.document["tasks"]
     return block.with_values({"program": {}, "tasks.ring": {**written["circle"], "path": RING}})
 
 
-def test_a_place_of_a_program_passes_where_it_does_for_each_of_its_tasks_alone(two_tasks: Cell) -> None:
-    circle = load_cell(CELL).with_values(SLOW)
-    ring = circle.with_values({"tasks.circle.path": RING})
+@pytest.fixture(scope="module")
+def two_tasks_map(two_tasks: Cell) -> Any:
+    return base_map(two_tasks, "right", WIDE)
 
-    places, *alone = (base_map(cell, "right", WIDE)["places"] for cell in (two_tasks, circle, ring))
+
+def test_a_place_of_a_program_passes_where_it_does_for_each_of_its_tasks_alone(
+    block: Cell, block_map: Any, two_tasks_map: Any
+) -> None:
+    ring = base_map(block.with_values({"tasks.circle.path": RING}), "right", WIDE)
+    places, *alone = (entry["places"] for entry in (two_tasks_map, block_map, ring))
 
     verdicts = [place["verdict"] == "passes" for place in places]
     assert verdicts == [all(place["verdict"] == "passes" for place in pair) for pair in zip(*alone, strict=True)]
@@ -180,6 +192,7 @@ def test_a_place_of_a_program_passes_where_it_does_for_each_of_its_tasks_alone(t
     assert failing == {"circle", "ring"}  # the task by which a place fails is named
 
 
+@pytest.mark.slow
 def test_no_place_is_too_fast_for_a_program_that_is_as_fast_as_its_limits_allow(two_tasks: Cell) -> None:
     hurried = two_tasks.with_values({"motion.duration_s": 1.5, "motion.step_s": 0.004})
     fastest = hurried.with_values({"motion.timing": "fastest"})
@@ -192,8 +205,8 @@ def test_no_place_is_too_fast_for_a_program_that_is_as_fast_as_its_limits_allow(
     assert all(other != "speed" for _, other in verdicts)
 
 
-def test_a_place_of_a_program_is_written_with_the_start_of_every_task(two_tasks: Cell) -> None:
-    places = base_map(two_tasks, "right", WIDE)
+def test_a_place_of_a_program_is_written_with_the_start_of_every_task(two_tasks: Cell, two_tasks_map: Any) -> None:
+    places = two_tasks_map
     best = places["best"][0]
 
     again = base_map(two_tasks.with_values(best["settings"]), "right", _at(places["places"][best["place"]]))
@@ -209,10 +222,10 @@ def _at(place: Any) -> BaseGrid:
 
 
 @pytest.mark.slow
-def test_a_base_from_which_nothing_is_reached_is_mapped_too(two_tasks: Cell) -> None:
-    away = two_tasks.with_values({"robots.right.base.x_mm": 9000})
+def test_a_base_from_which_nothing_is_reached_is_mapped_too(two_tasks: Cell, two_tasks_map: Any) -> None:
+    away = base_map(two_tasks.with_values({"robots.right.base.x_mm": 9000}), "right", WIDE)
 
-    verdicts = [[place["verdict"] for place in base_map(cell, "right", WIDE)["places"]] for cell in (two_tasks, away)]
+    verdicts = [[place["verdict"] for place in entry["places"]] for entry in (two_tasks_map, away)]
 
     assert verdicts[0] == verdicts[1]
 

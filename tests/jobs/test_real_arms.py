@@ -88,7 +88,8 @@ def arms(shared_robots, tmp_path_factory):
     return solved(ARMS, shared_robots, tmp_path_factory.mktemp("arms"))
 
 
-@pytest.mark.parametrize("name", [pytest.param("arms", marks=pytest.mark.slow), "turntable"])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["arms", "turntable"])
 def test_real_arms_work_on_a_moving_part(name, request):
     solution = request.getfixturevalue(name)
     report = solution.runs[0].report
@@ -108,6 +109,7 @@ def test_the_operators_do_all_the_work_when_the_part_is_at_rest(shared_robots, t
     assert report.motion_share["holder"][0] == 0.0
 
 
+@pytest.mark.slow
 def test_parallelogram_bars_are_driven_and_watched(turntable):
     """The bars of the IRB 2400 follow joint 3; where they meet by design is told, the rest is checked."""
     report = turntable.runs[0].report

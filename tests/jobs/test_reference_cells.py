@@ -8,8 +8,10 @@ import pytest
 from builders.solution_memo import solved_anew
 from builders.timed_cells import case_of
 from builders.two_phases import PAIR
+from builders.uncertified import uncertified
 
 from cellplan import load_cell, solve, verify, write_run
+from cellplan.files.cell.write import render_cell
 from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.solver import Integrator
 from cellplan.runs.overrides import with_overrides
@@ -32,7 +34,7 @@ def coarse(cells):
 
 @pytest.fixture(scope="module")
 def initial(cells):
-    return solve(load_cell(cells / "four_robots_initial.yaml"))
+    return uncertified(load_cell(cells / "four_robots_initial.yaml"))
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +44,7 @@ def pairs(cells):
 
 @pytest.fixture(scope="module")
 def at_rest(cells):
-    return solve(with_overrides(load_cell(cells / "four_robots.yaml"), mode="part_at_rest"))
+    return uncertified(with_overrides(load_cell(cells / "four_robots.yaml"), mode="part_at_rest"))
 
 
 def failed(report, name):
@@ -175,14 +177,15 @@ def test_written_tables_verify_and_any_edit_shows(coarse):
     assert set(failed(report, "joint_velocity")) == {"kuka/A2"}
 
 
-def test_swapped_or_missing_tables_are_refused(coarse):
+def test_swapped_or_missing_tables_are_refused(sound):
     from cellplan.errors import InputError
 
-    tables = dict(coarse.runs[0].program.tables)
+    cell = load_cell(sound / "cell" / "small.yaml")
+    tables = dict(solve(cell).runs[0].program.tables)
     with pytest.raises(InputError, match="expected one for each of"):
-        verify(coarse.cell, {name: text for name, text in tables.items() if name != "abb"})
+        verify(cell, {name: text for name, text in tables.items() if name != "left"})
     with pytest.raises(InputError):
-        verify(coarse.cell, tables | {"abb": tables["kuka"]})
+        verify(cell, tables | {"left": tables["right"]})
 
 
 def test_run_folder_holds_what_it_promises(four_robots, tmp_path):
@@ -222,14 +225,16 @@ def test_same_input_gives_the_same_bytes(coarse, cells, tmp_path):
         assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes(), name
 
 
-def test_resolved_cell_gives_the_same_motion(coarse, tmp_path):
-    write_run(coarse, tmp_path / "run")
-    again = solve(load_cell(tmp_path / "run" / "cell.yaml"))
+def test_resolved_cell_gives_the_same_motion(cells, tmp_path):
+    coarse = uncertified(load_cell(cells / "four_robots.yaml").with_values(COARSE))
+    (tmp_path / "cell.yaml").write_text(render_cell(coarse.cell), encoding="utf-8")
+    again = uncertified(load_cell(tmp_path / "cell.yaml"))
     np.testing.assert_array_equal(again.runs[0].motion.q, coarse.runs[0].motion.q)
 
 
 @pytest.mark.slow
-def test_failed_run_leaves_no_tables_unless_asked(initial, tmp_path):
+def test_failed_run_leaves_no_tables_unless_asked(cells, tmp_path):
+    initial = solve(load_cell(cells / "four_robots_initial.yaml"))
     write_run(initial, tmp_path / "plain")
     write_run(initial, tmp_path / "kept", keep_rejected=True)
 

@@ -201,7 +201,7 @@ def test_near_a_singularity_there_are_more_panels() -> None:
         ([(-2.0, 1.0)], [0.0, np.pi, 0.0]),  # starts folded
     ],
 )
-@pytest.mark.parametrize("step", [1e-3, 0.02])
+@pytest.mark.parametrize("step", [pytest.param(1e-3, marks=pytest.mark.slow), 0.02])
 def test_through_a_singularity_steps_lead_on_to_the_end(points: Any, start: Any, step: float) -> None:
     case = arm(points, start, step=step)
     motion = case.resolved()

@@ -14,7 +14,7 @@ def agrees(folder: Path, seed: int) -> None:
 
 
 def test_certified_distances_agree_with_brute_force(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(certified, "STEPS", 12)
+    monkeypatch.setattr(certified, "STEPS", 6)
     agrees(tmp_path, 2)
 
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.uncertified import uncertified
 
 from cellplan.checks.verify import verify_motion
 from cellplan.files.cell.load import load_cell
 from cellplan.model.motion.motion import JointTable
 from cellplan.model.report.report import Check
 from cellplan.runs.solution import Run, Solution
-from cellplan.runs.solve import solve
 
 CELL = Path(__file__).resolve().parents[3] / "cells" / "in_turn.yaml"
 LIMITS = {"program.transfer": {"speed_percent": 20, "tcp_mm_s": 400}, "motion.step_s": 0.05}
@@ -21,7 +21,7 @@ NAMES = ("transfer_joint_speed", "transfer_speed")
 
 @pytest.fixture(scope="module")
 def slow() -> Solution:
-    return solve(load_cell(CELL).with_values(LIMITS), is_reported=False)
+    return uncertified(load_cell(CELL).with_values(LIMITS))
 
 
 def limited(checks: tuple[Check, ...]) -> list[Check]:

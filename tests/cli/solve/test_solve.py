@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from builders.two_phases import PAIR
 
 from cellplan.cli.main import run
 from cellplan.cli.terminal import progress
@@ -36,37 +37,36 @@ def hasty_pair(cells: Path, tmp_path: Path) -> Path:
 
 
 def test_a_sound_cell_is_reported_and_written(
-    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    sound: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = tmp_path / "out"
+    monkeypatch.setattr(progress, "LINE_EVERY_S", math.inf)
+    cell, folder = sound / "cell" / "small.yaml", tmp_path / "out"
 
-    status = run(["solve", str(coarse_cell), "-o", str(folder)])
+    status = run(["solve", str(cell), "-o", str(folder)])
 
     out, err = capsys.readouterr()
     assert (status, err) == (0, "")
     lines = out.splitlines()
-    assert lines[0] == "four-robots: passed"
+    assert lines[0] == "small-pair: passed"
     assert lines[-4:] == [
         f"report: {folder / 'report.html'}",
         f"tables: {folder / 'tables'}",
-        f"next: cellplan view {folder}",
-        f"next: cellplan export {folder} --format csv --cell {coarse_cell}",
+        f"next: cellplan view {folder} --cell {cell}",
+        f"next: cellplan export {folder} --format csv --cell {cell}",
     ]
     assert sorted(path.name for path in (folder / "tables").iterdir()) == [
-        "abb.csv",
         "clock.csv",
-        "kuka.csv",
-        "reis.csv",
-        "staubli.csv",
+        "idle.csv",
+        "left.csv",
+        "right.csv",
     ]
 
 
-def test_a_machine_gets_one_object_with_the_whole_report(
-    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = tmp_path / "out"
+def test_a_machine_gets_one_object_with_the_whole_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cell, folder = tmp_path / "cell.yaml", tmp_path / "out"
+    cell.write_text(PAIR, encoding="utf-8")
 
-    status = run(["solve", str(coarse_cell), "-o", str(folder), "--task", "circle", "--json"])
+    status = run(["solve", str(cell), "-o", str(folder), "--mode", "part_at_rest", "--task", "first", "--json"])
 
     reported = json.loads(capsys.readouterr().out)
     assert (status, reported["exit"]) == (0, 0)
@@ -76,7 +76,7 @@ def test_a_machine_gets_one_object_with_the_whole_report(
     series = json.loads((folder / "series.json").read_text(encoding="utf-8"))
     assert len(series["times_s"]) == written["samples"]
     assert reported["report"] == written
-    assert list(reported["report"]["tasks"]) == ["circle"]
+    assert list(reported["report"]["tasks"]) == ["first"]
 
 
 def test_a_failed_cell_ends_with_one_and_leaves_no_tables(

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import tomllib
 from functools import cache
 from pathlib import Path
@@ -20,17 +21,18 @@ from cellplan.files.templates import TEMPLATES, Template, template_files, templa
 NAMED = [pytest.param(template, id=template.name) for template in TEMPLATES]
 
 
-@pytest.fixture(params=NAMED)
+@pytest.fixture(scope="module", params=NAMED)
 def template(request: pytest.FixtureRequest) -> Template:
     chosen: Template = request.param
     return chosen
 
 
-@pytest.fixture
-def folder(template: Template, tmp_path: Path) -> Path:
-    """The template, away from the other cells."""
-    write_folder(tmp_path / "new", template_files(template))
-    return tmp_path / "new"
+@pytest.fixture(scope="module")
+def folder(template: Template, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The template, away from the other cells; not to be changed."""
+    folder = tmp_path_factory.mktemp(template.name) / "new"
+    write_folder(folder, template_files(template))
+    return folder
 
 
 def test_a_template_needs_nothing_beside_its_folder(template: Template, folder: Path) -> None:
@@ -68,8 +70,8 @@ def test_every_file_conforms_to_the_schema_that_its_first_line_names(folder: Pat
     assert folder / "cell.yaml" in files
 
 
-def test_every_line_that_is_offered_in_a_comment_is_read(template: Template, folder: Path) -> None:
-    path = folder / "cell.yaml"
+def test_every_line_that_is_offered_in_a_comment_is_read(folder: Path, tmp_path: Path) -> None:
+    path = shutil.copytree(folder, tmp_path / "copy") / "cell.yaml"
     text = path.read_text(encoding="utf-8")
     original = render_cell(load_cell(path))
     for line in offered_choices(text):

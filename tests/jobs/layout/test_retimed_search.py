@@ -8,7 +8,7 @@ from builders.layout_search import searched_pair
 from cellplan import LayoutResult, load_cell, solve
 from cellplan.search.programs.objective import CycleTiming
 
-pytestmark = pytest.mark.usefixtures("stored_solutions")
+pytestmark = [pytest.mark.usefixtures("stored_solutions"), pytest.mark.slow]
 SETTINGS = (
     "tasks.circle.tolerance={position_mm: 0.1, orientation_deg: 0.05, between_rows_mm: 20, between_rows_deg: 20}",
     "acceleration={full_speed_in_s: 0.25}",

@@ -50,7 +50,7 @@ def test_four_robots_keep_to_their_paths_at_ten_points_between_all_samples() -> 
 
 
 @pytest.mark.parametrize("name", ["mixed", "spin", "closures", "carried"])
-@pytest.mark.parametrize("accuracy", [1e-4, 1e-6, 1e-9, 1e-11])
+@pytest.mark.parametrize("accuracy", [1e-4, *(pytest.param(at, marks=pytest.mark.slow) for at in (1e-6, 1e-9)), 1e-11])
 def test_the_error_is_below_what_is_asked_for(name: str, accuracy: float) -> None:
     cell = CELLS[name]
     case = triangles(replace(cell, solver=cell.solver.changed(accuracy_mm=1e3 * accuracy)), side=0.15)

@@ -102,7 +102,7 @@ def test_a_gain_of_one_per_step_leaves_no_lag():
     assert errors(schedule, motion).max() < 2e-6  # a thousandth of 1.1 mm per step, and the arm's curvature over it
 
 
-@pytest.mark.parametrize("gain", [1.0, 50.0, 199.0])
+@pytest.mark.parametrize("gain", [1.0, pytest.param(50.0, marks=pytest.mark.slow), 199.0])
 @pytest.mark.parametrize("offset", [(-0.8, -0.9), (2.0, 0.0), (-1.0, -1.5)])
 def test_far_and_unreachable_points_are_approached_without_leaps(gain, offset):
     cell = arm(gain)

@@ -135,7 +135,7 @@ def test_blended_paths_are_one_piece_near_the_corners(name: str) -> None:
 
     p = round_.poses(np.linspace(0.0, round_.length, 4001))[:, :3, 3]
     q = sharp.poses(np.linspace(0.0, sharp.length, 8001))[:, :3, 3]
-    away = np.array([np.linalg.norm(q - point, axis=1).min() for point in p])
+    away = np.array([np.linalg.norm(q - point, axis=1).min() for point in p[::5]])
 
     assert len(round_.pieces) == 1
     assert away.max() <= blend

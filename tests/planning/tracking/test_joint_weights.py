@@ -123,7 +123,9 @@ def test_load_spares_the_shoulder_more_than_the_wrist():
     )
 
 
-@pytest.mark.parametrize("method", ["weighted_pseudo_inverse", "quadratic_program"])
+@pytest.mark.parametrize(
+    "method", ["weighted_pseudo_inverse", pytest.param("quadratic_program", marks=pytest.mark.slow)]
+)
 def test_a_joint_near_its_limit_moves_less_and_the_task_is_kept(method):
     limits = {"q4": {"lower": 0.35, "upper": 1.2}}
     cell = planar_arm_cell(method=method, limits=limits)

@@ -150,7 +150,9 @@ def test_tool_at_work_and_the_robot_itself_are_left_out() -> None:
     assert {scene.pairs[pair.row].clearance_class for pair in self_pairs} == {ClearanceClass.SELF}
 
 
-@pytest.mark.parametrize("name", ["four_robots", "mesh_part_csv", "dual_arm"])
+@pytest.mark.parametrize(
+    "name", ["mesh_part_csv", *(pytest.param(name, marks=pytest.mark.slow) for name in ("four_robots", "dual_arm"))]
+)
 def test_no_near_pair_is_missed(name: str) -> None:
     """Against the distance of every pair, measured without spheres or boxes."""
     cell = load_cell(FOLDER / f"{name}.yaml")

@@ -300,10 +300,16 @@ def tracking_errors(cell: Cell, schedule: Schedule, motion: Motion) -> np.ndarra
     )
 
 
+@pytest.fixture(scope="module")
+def without_goals() -> tuple[Schedule, Motion]:
+    return planned(*four_robots())
+
+
 @pytest.mark.parametrize("kind", list(GOALS))
-def test_each_goal_improves_along_a_whole_motion_of_four_robots(kind: str) -> None:
-    cell, start = four_robots()
-    schedule, plain = planned(cell, start)
+def test_each_goal_improves_along_a_whole_motion_of_four_robots(
+    kind: str, without_goals: tuple[Schedule, Motion]
+) -> None:
+    (cell, start), (schedule, plain) = four_robots(), without_goals
     goal = GOALS[kind]
     _, helped = planned(with_goals(cell, goal), start)
     samples = range(0, len(plain.q), 20)

@@ -73,11 +73,12 @@ def test_what_is_not_broken_is_read(name: str) -> None:
     assert RAPID.read(job_named(name).frame, files_of(name))[0].robots.keys() == set(job_named(name).frame.robots)
 
 
+@pytest.mark.parametrize("cuts", [2, pytest.param(12, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["sync", "pages", "signals", "part"])
-def test_a_file_that_is_cut_anywhere_is_refused(name: str) -> None:
+def test_a_file_that_is_cut_anywhere_is_refused(name: str, cuts: int) -> None:
     files = files_of(name)
     for path, text in files.items():
-        for place in range(0, len(text) - 1, max(1, len(text) // 6)):
+        for place in range(0, len(text) - 1, max(1, len(text) // cuts)):
             refused(name, {**files, path: text[:place]})
 
 

@@ -57,7 +57,7 @@ def shortened(value: Any) -> Any:
     return value
 
 
-@pytest.mark.parametrize("kind", ["passed_run", "failed_run", "rail_run"])
+@pytest.mark.parametrize("kind", ["passed_run", pytest.param("failed_run", marks=pytest.mark.slow), "rail_run"])
 @pytest.mark.parametrize("has_motion", [False, True])
 def test_the_report_of_a_run_conforms(
     validator: Draft202012Validator, kind: str, has_motion: bool, request: pytest.FixtureRequest

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from builders.home_to_home import PICK_AND_PLACE
 from builders.two_phases import seal_program
+from builders.uncertified import uncertified
 
 from cellplan import Solution, export_program, load_cell, open_gate, solve, verify, write_run
 from cellplan.checks.joints.joins import check_joins
@@ -28,9 +29,16 @@ PHASES = (
 
 @pytest.fixture(scope="module")
 def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Solution]:
-    """The cell file and its solution; the run is written beside it."""
+    """The cell file and its solution, whose clearance is left to the slow tests."""
     file = tmp_path_factory.mktemp("home") / "cell.yaml"
     file.write_text(PICK_AND_PLACE, encoding="utf-8")
+    return file, uncertified(load_cell(file))
+
+
+@pytest.fixture(scope="module")
+def written(solved: tuple[Path, Solution]) -> tuple[Path, Solution]:
+    """The cell file and its whole solution; the run is written beside it."""
+    file = solved[0]
     solution = solve(load_cell(file))
     write_run(solution, file.parent / "run")
     return file, solution
@@ -120,8 +128,9 @@ def test_the_rows_in_which_phases_meet_are_judged_by_the_steps_on_both_sides(sol
 
 
 @pytest.mark.slow
-def test_verification_accepts_it_from_the_cell_file_and_each_phase_by_name(solved: tuple[Path, Solution]) -> None:
-    file, solution = solved
+def test_verification_accepts_it_from_the_cell_file_and_each_phase_by_name(written: tuple[Path, Solution]) -> None:
+    file, solution = written
+    assert solution.passed
     run = open_gate(file.parent / "run", cell=file)
 
     assert [motion.name for motion in run.motions] == list(PHASES)
@@ -139,8 +148,8 @@ def test_verification_accepts_it_from_the_cell_file_and_each_phase_by_name(solve
 
 
 @pytest.mark.slow
-def test_it_is_exported_as_one_program_for_each_robot(solved: tuple[Path, Solution], tmp_path: Path) -> None:
-    file, solution = solved
+def test_it_is_exported_as_one_program_for_each_robot(written: tuple[Path, Solution], tmp_path: Path) -> None:
+    file, solution = written
     files = export_program(open_gate(file.parent / "run", cell=file), tmp_path / "programs")
 
     assert files == ("holder.csv", "pen.csv")
@@ -210,18 +219,16 @@ FORGERIES: dict[str, tuple[Callable[[Path], None], str]] = {
 }
 
 
-LATE = {"home", "jump", "start"}  # are refused by or after the checks of all motions
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(forgery, marks=pytest.mark.slow if forgery in LATE else ()) for forgery in FORGERIES]
-)
-def test_forged_programs_are_refused_with_their_place(name: str, solved: tuple[Path, Solution], tmp_path: Path) -> None:
+@pytest.mark.slow  # quickly in `test_program_of_phases`, of a smaller cell
+@pytest.mark.parametrize("name", FORGERIES)
+def test_forged_programs_are_refused_with_their_place(
+    name: str, written: tuple[Path, Solution], tmp_path: Path
+) -> None:
     edit, words = FORGERIES[name]
     run = tmp_path / "run"
-    shutil.copytree(solved[0].parent / "run", run)
+    shutil.copytree(written[0].parent / "run", run)
     edit(run)
     seal_program(run, robots=("holder", "pen"))
 
     with pytest.raises((InputError, InvalidFileError, NotVerifiedError), match=words):
-        open_gate(run, cell=solved[0])
+        open_gate(run, cell=written[0])

@@ -261,6 +261,7 @@ def seal_again(run: Path) -> None:
     edit_json(run / "manifest.json", change)
 
 
+@pytest.mark.slow
 def test_a_forged_cache_entry_moves_nothing_that_is_verified(copy: Path, cache_folder: Path) -> None:
     cell = copy / "cell" / "small.yaml"
     isolated_call._end_child()  # the next one knows this cache

@@ -9,7 +9,7 @@ from cellplan.scene.collision.bodies import checked_poses, prepare
 from cellplan.scene.collision.separation import separation
 from cellplan.scene.collision.signed_distance import SignedDistances
 
-STATES = 40  # [-] of each pair
+STATES = 16  # [-] of each pair
 DIRECTIONS = 300  # [-] at random, then about the best one, in each of the spreads
 SPREADS = (10.0, 0.1, 0.03, 0.01, 0.003)  # [-]
 ROUNDING = 1e-5  # [m]

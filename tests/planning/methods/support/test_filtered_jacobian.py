@@ -32,7 +32,9 @@ def random_jacobian(seed, shape, *, lost=0):
     return (U * s) @ Vt, rng.normal(size=shape[::-1])
 
 
-@pytest.mark.parametrize("shape", [(2, 3), (6, 6), (6, 9), (5, 3), (1, 4)])
+@pytest.mark.parametrize(
+    "shape", [(2, 3), (6, 6), *(pytest.param(shape, marks=pytest.mark.slow) for shape in ((6, 9), (5, 3), (1, 4)))]
+)
 @pytest.mark.parametrize("lost", [0, 1])
 def test_the_exact_step_is_what_fine_integration_gives(shape, lost):
     J, theta = random_jacobian(1, shape, lost=lost)
