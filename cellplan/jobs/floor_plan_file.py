@@ -1,7 +1,7 @@
 """Write the floor plan of a run, or of a cell that was not solved, as SVG or DXF."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Final
@@ -14,15 +14,18 @@ from cellplan.files.run.stored import read_stored_run
 from cellplan.files.run.whole_file import refuse_foreign, replace_older
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.check import check
+from cellplan.jobs.pendant_frames import pendant_frames
 from cellplan.jobs.view.cell_scene import standing
 from cellplan.jobs.view.describe import path_points
 from cellplan.jobs.view.run_scene import stored_series
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
+from cellplan.programs.promises.stations import stations
 from cellplan.report.floor_plan.dxf import MARK, floor_plan_dxf, require_dxf
 from cellplan.report.floor_plan.plan import FloorPlan
 from cellplan.report.floor_plan.sheet import SVG_START, floor_plan_svg
 from cellplan.runs.drawings.floor_plan import floor_plan, swept_state
+from cellplan.runs.gate.open_gate import read_run
 from cellplan.runs.gate.stored_cell import load_stored_cell
 from cellplan.runs.overrides import with_overrides
 
@@ -48,6 +51,7 @@ class FloorPlanRequest:
         cell: The cell file of a run that depends on further files; None where the folder is enough.
         settings: Values of a cell file, as ``KEY=VALUE``.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+        frames: Whether it shows the frames to type into the pendants, which a failed run does not have.
     """
 
     path: Path
@@ -56,6 +60,7 @@ class FloorPlanRequest:
     cell: Path | None = None
     settings: Sequence[str] = field(default=())
     allow_dirs: Sequence[Path] = field(default=())
+    frames: bool = False
 
 
 def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = silent) -> FloorPlan:
@@ -68,7 +73,9 @@ def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = sile
         progress: Called with the stage and the fraction done.
 
     Raises:
-        InputError: The path is neither a run nor a cell, or does not fit the options.
+        InputError: The path is neither a run nor a cell, or does not fit the options; a robot has more frames of the
+            part than the cell states numbers.
+        NotVerifiedError: Frames are to be shown of a run that failed.
     """
     if request.form is PlanFormat.DXF:
         require_dxf()
@@ -80,7 +87,8 @@ def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = sile
         raise InputError(f"--cell: expected a run with it, got '{request.path}'")
     cell = with_overrides(load_cell(request.path, allow_dirs=request.allow_dirs), request.settings)
     _refuse_place(request, cell.name)
-    return _of_cell(cell, progress)
+    plan = _of_cell(cell, progress)
+    return replace(plan, pendants=pendant_frames(cell, None)) if request.frames else plan
 
 
 def target_of(request: FloorPlanRequest, cell: str) -> Path:
@@ -129,7 +137,10 @@ def _of_run(request: FloorPlanRequest) -> FloorPlan:
     motions = [_by_robot(cell, q) for _, q in read]
     start = {name: q[0] for name, q in motions[0].items()}
     whole = sum(float(times[-1]) for times, _ in read)
-    return floor_plan(cell, start, motions, _task_points(cell), state=swept_state(whole))
+    plan = floor_plan(cell, start, motions, _task_points(cell), state=swept_state(whole))
+    if not request.frames:
+        return plan
+    return replace(plan, pendants=pendant_frames(cell, stations(read_run(stored, cell))))
 
 
 def _of_cell(cell: Cell, progress: Progress) -> FloorPlan:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cellplan.cli.options import shared
 from cellplan.cli.options.request import Options, argument, option
@@ -27,6 +27,13 @@ class FloorPlanOptions(Options):
     form: Annotated[
         str | None, option("--format FORMAT", "svg or dxf (default: that of FILE by its ending, or svg).")
     ] = None
+    frames: Annotated[
+        bool,
+        option(
+            "--frames",
+            "Also the frames to type into the pendants, on A3.",
+        ),
+    ] = False
     cell: shared.OriginalCell = None
     settings: shared.Settings = ()
     as_json: shared.AsJson = False
@@ -38,7 +45,9 @@ def floor_plan(options: FloorPlanOptions) -> None:
     """Draw the floor plan: outlines, reach, swept areas, paths, and dimensions between the bases in millimetres.
 
     Of a run it shows what its motion sweeps; of a cell that was not solved the start. DXF needs the package ezdxf, as
-    pip install 'cellplan[dxf]' brings it. Exit status: 0 the drawing was written, 2 bad input, 4 internal error.
+    pip install 'cellplan[dxf]' brings it. With --frames it also prints and shows what is typed into the pendants: base
+    and tool of each robot, and the part in every pose in which the robot works on it, as its maker writes them. Exit
+    status: 0 the drawing was written, 1 frames of a run that failed, 2 bad input, 4 internal error.
     """
     from cellplan.jobs.floor_plan_file import (
         FloorPlanRequest,
@@ -47,6 +56,7 @@ def floor_plan(options: FloorPlanOptions) -> None:
         target_of,
         write_floor_plan,
     )
+    from cellplan.report.floor_plan.pendants import pendant_lines
 
     request = options.to(FloorPlanRequest, form=PlanFormat(_format(options.form, options.output)))
     with progress_listener(quiet=options.quiet) as progress:
@@ -54,10 +64,14 @@ def floor_plan(options: FloorPlanOptions) -> None:
     target = target_of(request, plan.cell)
     size = write_floor_plan(plan, target, request.form)
     if options.as_json:
-        about = {"cell": plan.cell, "drawing": str(target), "format": str(request.form), "bytes": size}
+        about: dict[str, Any] = {"cell": plan.cell, "drawing": str(target), "format": str(request.form), "bytes": size}
+        if request.frames:
+            about["frames"] = [pendant.record for pendant in plan.pendants]
         say_json({"schema": options.schema, "status": "written", "exit": int(ExitStatus.PASSED), **about})
     else:
         say(f"{plan.cell}: {target} ({size / 1e3:.0f} kB)")
+        for line in pendant_lines(plan.pendants):
+            say(line)
 
 
 def _format(form: str | None, output: Path | None) -> str:

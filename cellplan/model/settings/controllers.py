@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.model.settings.acceleration import CycleTime
-from cellplan.model.settings.entry import Angle, Coordinate, Entry, Name, Text, by_kind, rule
+from cellplan.model.settings.entry import Angle, Coordinate, Entry, Name, PoseEntry, Text, by_kind, rule
 from cellplan.model.settings.units import Ms, Within
 
 LARGEST_FACTOR: Final = 1_000.0  # [-] a larger coupling is a mistake
@@ -22,6 +22,7 @@ LAST_FRAME: Final = 999
 MOST_DECIMALS: Final = 9
 TASK_LIMIT: Final = 64
 SIGNAL_LIMIT: Final = 64
+FRAME_LIMIT: Final = 64
 
 
 class ControllerZeroEntry(Entry):
@@ -73,6 +74,7 @@ Signal = Annotated[
 ]
 Delay = Annotated[Ms, Within(ge=0.0, le=SLOWEST_MS)]
 FrameNumber = Annotated[int, Field(ge=0, le=LAST_FRAME)]
+PartFrameNumber = Annotated[int, Field(ge=1, le=LAST_FRAME)]
 KindName = Literal["abb", "fanuc", "kuka", "reis", "ros", "staubli", "ur", "yaskawa", "other"]
 
 
@@ -149,6 +151,21 @@ class RobotControlEntry(Entry):
     )
     base_number: FrameNumber | None = Field(
         default=None, description="Number of its base frame on the controller; absent: the base of the robot."
+    )
+    frames: tuple[PartFrameNumber, ...] = Field(
+        default=(),
+        max_length=FRAME_LIMIT,
+        description="Numbers of the frames of the part on the controller, one for each pose of the part in which the "
+        "robot works, in the order of first use; not stated when absent.",
+    )
+    base: PoseEntry | None = Field(
+        default=None,
+        description="Base that its controller counts from, in the base of the model; {}: the same. Absent: not stated.",
+    )
+    tool_frame: PoseEntry | None = Field(
+        default=None,
+        description="Flange that its controller counts tools from, in the flange of the model; {}: the same. Absent: "
+        "not stated.",
     )
     handshake: HandshakeEntry | None = Field(
         default=None, description="Signals with which it waits for other robots; none when absent."

@@ -11,6 +11,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
+from cellplan.report.floor_plan.pendants import pendant_lines
 from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanWall, length_text
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ def floor_plan_dxf(plan: FloorPlan) -> str:
     _draw_bases(space, plan, height)
     for number, dimension in enumerate(plan.dimensions):
         _draw_dimension(document, dimension, corner=low - 3.0 * height, height=height, number=number)
+    _draw_frames(space, plan, at=low - 12.0 * height, height=height)
     words = f"Floor plan of {plan.cell}: {plan.state}; lengths in mm"
     _text(space, NAMES, words, at=np.array([low[0], high[1] + 2.0 * height]), height=height)
     stream = StringIO()
@@ -143,6 +145,18 @@ def _draw_bases(space: "Modelspace", plan: FloorPlan, height: float) -> None:
         for number, words in enumerate(lines):
             at = robot.base[:2] + height * np.array([0.6, -1.6 - 1.3 * number])
             _text(space, NAMES, words, at=at, height=(0.7 if number else 1.0) * height)
+
+
+def _draw_frames(space: "Modelspace", plan: FloorPlan, *, at: Array, height: float) -> None:
+    """Axes and names of fixed frames of the part, and below the plan all frames to type into the pendants."""
+    for place, frames in plan.fixed_frames.items():
+        for X_W in frames.values():
+            for share, toward in zip((3.0, 1.8), X_W[:2, :2].T, strict=True):
+                end = _point(np.array(place) + share * height * toward)
+                space.add_line(place, end, dxfattribs={"layer": str(Layer.PART)})
+        _text(space, NAMES, ", ".join(frames), at=np.array(place) - [0.0, 1.6 * height], height=0.7 * height)
+    for number, words in enumerate(pendant_lines(plan.pendants)):
+        _text(space, NAMES, words, at=at - [0.0, 1.3 * height * number], height=0.7 * height)
 
 
 def _draw_dimension(document: "Drawing", dimension: Dimension, *, corner: Array, height: float, number: int) -> None:

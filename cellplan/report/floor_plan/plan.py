@@ -8,6 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from cellplan.geometry.arrays import Array
+from cellplan.model.units import MM
+from cellplan.report.floor_plan.pendants import PlanPendant
 
 LONGEST_CHAIN = 14  # places of a chain of dimensions; of more only the whole length is given
 SAME_PLACE = 0.5  # [mm] lines of a chain of dimensions that are nearer are one
@@ -96,6 +98,9 @@ class FloorPlan:
     walls: tuple[PlanWall, ...]  # vertical half-spaces among the surroundings
     whole: tuple[Array, ...]  # contours of what the whole cell covers during the motion
     square: float | None  # edge of the squares that swept areas are made of; None without a motion
+    pendants: tuple[
+        PlanPendant, ...
+    ] = ()  # frames to type into the pendants, by robot; none unless they are to be shown
 
     @property
     def dimensions(self) -> tuple[Dimension, ...]:
@@ -113,6 +118,16 @@ class FloorPlan:
                 yield Dimension(axis=axis, first=first, second=second, row=0)
         if len(chain) > 2:
             yield Dimension(axis=axis, first=chain[0], second=chain[-1], row=1)
+
+    @property
+    def fixed_frames(self) -> dict[tuple[float, float], dict[str, Array]]:
+        """Fixed frames of the part by place in [mm] and name: poses in the world in [m], shape (4, 4) each."""
+        places: dict[tuple[float, float], dict[str, Array]] = {}
+        for frame in (frame for pendant in self.pendants for frame in pendant.frames):
+            if frame.X_W is not None:
+                x, y = (np.round(MM * frame.X_W[:2, 3]) + 0.0).tolist()
+                places.setdefault((x, y), {})[frame.name] = frame.X_W
+        return places
 
     @property
     def bounds(self) -> tuple[Array, Array]:

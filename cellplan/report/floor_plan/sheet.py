@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
+from cellplan.report.floor_plan.pendants import pendant_lines
 from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanRobot, PlanWall, length_text
 from cellplan.report.record.common import shortened
 
@@ -19,6 +20,8 @@ MARGIN, COLUMN, GAP = 90, 700, 40  # units: border, width of the table, distance
 HEADING: Final = 150  # units above the plan
 BAND, ROW = 70, 75  # units from the plan to the first row of dimensions, and from row to row
 ROWS: Final = 2
+TYPED, TYPED_LETTERS = 36, 190  # units between lines of frames to type, and letters in them
+AXES: Final = (60.0, 36.0)  # units: x and y axes of frames of the part
 SCALES: Final = (1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 60, 75, 100, 125, 150, 200, 250, 300, 400, 500)
 BARS: Final = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)  # [mm] lengths of a scale bar
 LONGEST_BAR: Final = 480  # units
@@ -52,6 +55,7 @@ svg.plan-sheet {{ font-family: {FONT}; color-scheme: light dark; max-width: 100%
 .plan-sheet .cross, .plan-sheet .bar, .plan-sheet .axes {{ stroke: #1d2733; stroke-width: 4; }}
 .plan-sheet .rule {{ stroke: #b9c1cb; }}
 """
+MONOSPACED: Final = ".plan-sheet text.typed { font: 24px ui-monospace, monospace; white-space: pre; }\n"
 DARK: Final = """
 .plan-sheet .sheet { fill: #161b22; }
 .plan-sheet text { fill: #e3e8ee; }
@@ -92,21 +96,24 @@ def floor_plan_svg(plan: FloorPlan) -> str:
     """A floor plan as the text of an SVG element that stands alone or in a page; equal plans give equal text."""
     sheet = laid_out(plan)
     numbers = {robot.name: index for index, robot in enumerate(plan.robots)}
+    height = _height(plan)
     robots = ", ".join(f"{robot.name} at x {robot.base[0]:.1f} mm, y {robot.base[1]:.1f} mm" for robot in plan.robots)
     body = [
-        f'{SVG_START} xmlns="http://www.w3.org/2000/svg" width="{WIDTH_MM}mm" height="{HEIGHT_MM}mm" '
-        f'viewBox="0 0 {UNIT * WIDTH_MM:.0f} {UNIT * HEIGHT_MM:.0f}" role="img" '
+        f'{SVG_START} xmlns="http://www.w3.org/2000/svg" width="{WIDTH_MM}mm" height="{height}mm" '
+        f'viewBox="0 0 {UNIT * WIDTH_MM:.0f} {UNIT * height:.0f}" role="img" '
         'aria-labelledby="floor-plan-title floor-plan-desc">',
         f'<title id="floor-plan-title">Floor plan of {escape(plan.cell)}, scale 1:{sheet.scale:g}</title>',
         f'<desc id="floor-plan-desc">{escape(plan.state)}. {escape(robots)}.</desc>',
-        f"<style>{style([robot.colour for robot in plan.robots])}</style>",
-        f'<rect class="sheet" width="{UNIT * WIDTH_MM:.0f}" height="{UNIT * HEIGHT_MM:.0f}"/>',
+        f"<style>{style([robot.colour for robot in plan.robots])}{MONOSPACED if plan.pendants else ''}</style>",
+        f'<rect class="sheet" width="{UNIT * WIDTH_MM:.0f}" height="{UNIT * height:.0f}"/>',
         *_heading(plan, sheet),
         *_areas(plan, sheet, numbers),
         *_bodies(plan, sheet, numbers),
         *_bases(plan, sheet, numbers),
         *(line for dimension in plan.dimensions for line in _dimension(dimension, sheet)),
         *_table(plan, sheet, numbers),
+        *_frames(plan, sheet),
+        *_pendants(plan),
         "</svg>\n",
     ]
     return "\n".join(body)
@@ -115,7 +122,8 @@ def floor_plan_svg(plan: FloorPlan) -> str:
 def _heading(plan: FloorPlan, sheet: Sheet) -> Iterator[str]:
     """Title and state above the plan."""
     yield _text("title", MARGIN, MARGIN + 40, f"Floor plan of {plan.cell}")
-    yield _text("soft", MARGIN, MARGIN + 88, f"{plan.state}; scale 1:{sheet.scale:g} on A4, lengths in mm")
+    paper = "A3" if plan.pendants else "A4"
+    yield _text("soft", MARGIN, MARGIN + 88, f"{plan.state}; scale 1:{sheet.scale:g} on {paper}, lengths in mm")
 
 
 def _areas(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[str]:
@@ -159,6 +167,31 @@ def _bases(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
         cross = f"M{x - 22:.1f} {y:.1f}H{x + 22:.1f}M{x:.1f} {y - 22:.1f}V{y + 22:.1f}M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}"
         yield f'<path class="cross" d="{cross}"/>'
         yield _text(f"name n{numbers[robot.name]}", x, y + 60, shortened(robot.name, NAME_IN_PLAN))
+
+
+def _pendants(plan: FloorPlan) -> Iterator[str]:
+    """Frames to type into the pendants, below the plan."""
+    if plan.pendants:
+        yield _text("title", MARGIN, UNIT * HEIGHT_MM + MARGIN, "Frames to type into the pendants")
+    for number, words in enumerate(pendant_lines(plan.pendants), start=2):
+        yield _text("typed", MARGIN, UNIT * HEIGHT_MM + MARGIN + TYPED * number, shortened(words, TYPED_LETTERS))
+
+
+def _height(plan: FloorPlan) -> int:
+    """Height of the sheet in [mm]: A3 upright with frames to type, or what a longer list needs."""
+    lines = len(list(pendant_lines(plan.pendants)))
+    least = HEIGHT_MM + int(np.ceil((TYPED * (lines + 2) + 2 * MARGIN) / UNIT))
+    return max(2 * HEIGHT_MM, least) if lines else HEIGHT_MM
+
+
+def _frames(plan: FloorPlan, sheet: Sheet) -> Iterator[str]:
+    """Fixed frames of the part: their x and y axes, and the names of those at one place below it."""
+    for place, frames in plan.fixed_frames.items():
+        x, y = sheet.place(np.array(place))
+        for axes in (frame[:2, :2] * AXES for frame in frames.values()):
+            (a, b), (c, d) = (axes * [[1.0], [-1.0]] + [[x], [y]]).T.tolist()
+            yield f'<path class="cross" d="M{a:.1f} {b:.1f}L{x:.1f} {y:.1f}L{c:.1f} {d:.1f}"/>'
+        yield _text("thing", x, y + 34, ", ".join(frames))
 
 
 def _dimension(dimension: Dimension, sheet: Sheet) -> Iterator[str]:

@@ -106,6 +106,17 @@ def open_gate(
     )
 
 
+def read_run(stored: StoredRun, cell: Cell) -> ReadRun:
+    """What the files of a run that passed say, before anything in them is verified.
+
+    Args:
+        cell: The cell of the run, compared with its sources.
+    """
+    _refuse_failed(stored)
+    demanded = _demanded(cell, stored)
+    return _read_run(stored, cell, demanded, read_rows(stored, cell, demanded))
+
+
 def _read_run(stored: StoredRun, cell: Cell, demanded: DemandedProgram, rows: StoredRows) -> ReadRun:
     """The run as it is before anything is verified."""
     phases = zip(demanded.plan.program[: len(demanded.cells)], rows.clock.schedules, strict=False)

@@ -16,6 +16,7 @@ EXTERNAL: Final = 6  # external axes that a row of these programs holds
 OF_SIX_AXES: Final = frozenset({"abb", "kuka", "staubli"})
 SIGNALS: Final = {"kuka": (1, 4096), "ur": (0, 7)}  # first and last number, by kinds whose signals are numbers
 FRAMES: Final = {"kuka": 128}  # largest number of a tool or base, by kind
+PART_FRAMES: Final = {**FRAMES, "fanuc": 9}  # likewise of a frame of the part
 WITH_GROUPS: Final = ("fanuc", "yaskawa")
 Uses = dict[tuple[str, str, str], str]  # controller, what, name in lower case -> key path of the first use
 
@@ -119,11 +120,18 @@ def _frames(
     path: KeyPath, control: RobotControlEntry, entry: ControllerEntry, document: YamlDocument
 ) -> Iterator[Finding]:
     """Numbers of tools and bases that a controller of the kind has."""
-    last = FRAMES.get(entry.kind)
-    for key, number in (("tool_number", control.tool_number), ("base_number", control.base_number)):
+    stated: list[tuple[KeyPath, int | None, int | None]] = [
+        (("tool_number",), control.tool_number, FRAMES.get(entry.kind)),
+        (("base_number",), control.base_number, FRAMES.get(entry.kind)),
+    ]
+    stated += [(("frames", at), number, PART_FRAMES.get(entry.kind)) for at, number in enumerate(control.frames)]
+    for key, number, last in stated:
         if last is not None and number is not None and number > last:
             text = f"expected at most {last}, as many as controllers of kind {entry.kind} have, got {number}"
-            yield document.finding((*path, key), text)
+            yield document.finding((*path, *key), text)
+    for at, number in enumerate(control.frames):
+        if number in control.frames[:at]:
+            yield document.finding((*path, "frames", at), f"expected each number once, got {number} twice")
 
 
 def _used_twice(path: KeyPath, control: RobotControlEntry, uses: Uses, document: YamlDocument) -> Iterator[Finding]:

@@ -117,7 +117,7 @@ def _examine_tool(unit: RapidUnit, datum: Datum, value: Any) -> None:
         datum.statement.refuse("a mass above 0", f"{value[2][0]:g}")
     if abs(np.linalg.norm(value[2][2]) - 1.0) > UNIT_TOL:
         datum.statement.refuse("a quaternion of unit length in the load")
-    _require_frame(datum, value[1], unit.robot.tool.X_FT, what="the tool of the cell")
+    _require_frame(datum, value[1], unit.X_GT, what="the tool of the cell")
 
 
 def _examine_work_object(datum: Datum, value: Any, part: PartFrame | None) -> None:
@@ -129,7 +129,7 @@ def _examine_work_object(datum: Datum, value: Any, part: PartFrame | None) -> No
     if value[2] != part.unit:
         datum.statement.refuse(f'the mechanical unit "{part.unit}"', f'"{value[2]}"')
     _require_frame(datum, value[3], pose(), what="the identity as user frame")
-    _require_frame(datum, value[4], part.X_FP, what="the part in the flange frame as object frame")
+    _require_frame(datum, value[4], part.X_GP, what="the part in the flange frame as object frame")
 
 
 def _require_frame(datum: Datum, value: Any, X: Array, *, what: str) -> None:

@@ -16,9 +16,10 @@ from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, rotation_about
 from cellplan.model.cell.cell import Robot
 from cellplan.model.units import MM
+from cellplan.programs.elements.conventions import QUATERNION_DECIMALS, quaternions
 from cellplan.programs.elements.joints import Axes, from_numbers, to_numbers
 from cellplan.programs.elements.text import fixed
-from cellplan.programs.formats.rapid.units import ABSENT, EXTERNAL_AXES, QUATERNION_DECIMALS, RapidUnit, quaternions
+from cellplan.programs.formats.rapid.units import ABSENT, EXTERNAL_AXES, RapidUnit
 
 QUARTER: Final = 90.0  # [deg]
 MEETING_TOL: Final = 1e-6  # [m] axes of a wrist that pass nearer than this to its centre meet there

@@ -4,21 +4,19 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, Promise, Targets
 from cellplan.model.settings.controllers import RobotControlEntry
 from cellplan.model.task.task import Frame
+from cellplan.programs.elements.frames import on_flange
 from cellplan.programs.elements.joints import Axes
 from cellplan.programs.elements.text import safe_names
 from cellplan.programs.elements.timed_rows import decimals_of
 
 DECIMALS: Final = 4  # of a degree or millimetre
 TIME_DECIMALS: Final = 6  # of a second
-QUATERNION_DECIMALS: Final = 7  # as many as a number of the controller holds
 LONGEST_NAME: Final = 32
 LONGEST_MODULE: Final = 24  # room for `t_` before it and for the number of a page behind it
 EXTERNAL_AXES: Final = 6
@@ -60,6 +58,11 @@ class RapidUnit:
     decimals: int  # of a degree or millimetre
 
     @property
+    def X_GT(self) -> Array:
+        """Its tool tip in the flange of the controller, shape (4, 4)."""
+        return on_flange(self.robot, self.robot.tool.X_FT)
+
+    @property
     def has_tool(self) -> bool:
         """Whether it has a tool centre point; a positioner has external axes only."""
         return bool(self.axes.arm)
@@ -70,7 +73,7 @@ class PartFrame:
     """The work object of a part that a robot carries."""
 
     unit: str  # the mechanical unit that moves it
-    X_FP: Array  # the part in the flange frame of that unit, shape (4, 4)
+    X_GP: Array  # the part in the flange of that unit as the controller has it, shape (4, 4)
 
 
 def rapid_units(frame: ExportFrame) -> tuple[RapidUnit, ...]:
@@ -110,7 +113,7 @@ def part_frame(frame: ExportFrame) -> PartFrame | None:
     """The work object of targets on the part; None in an export of joint targets.
 
     The holder's flange carries the part without moving in it, so its work object states no user frame, and the part in
-    the flange as object frame: ``X_FP = X_FT X_TP`` of the holder.
+    its flange as object frame: ``X_GP = inv(X_FG) X_FT X_TP`` of the holder.
 
     ``InputError`` where no robot of the export carries the part, or the robots are not synchronised.
     """
@@ -127,33 +130,7 @@ def part_frame(frame: ExportFrame) -> PartFrame | None:
         raise InputError(f"--targets part: expected '{holder}', which holds the part, among the exported robots")
     task, placed = rapid_task(frame, holder), frame.robot(holder)
     unit = frame.cell.controllers[_control(frame, holder).id].tasks[task]
-    return PartFrame(unit=unit, X_FP=placed.tool.X_FT @ frame.cell.part.X_CP)
-
-
-def quaternions(R: Array) -> Array:
-    """Unit quaternions w, x, y, z of rotations, shape (N, 3, 3) to (N, 4), each on the side of the one before it.
-
-    The largest component is found first, from the diagonal; the others follow from sums and differences of pairs.
-    """
-    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
-    x, y, z = R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]
-    xy, xz, yz = R[:, 1, 0] + R[:, 0, 1], R[:, 0, 2] + R[:, 2, 0], R[:, 2, 1] + R[:, 1, 2]
-    outer = np.array(  # 4 q q^T, shape (4, 4, N)
-        [
-            [1 + xx + yy + zz, x, y, z],
-            [x, 1 + xx - yy - zz, xy, xz],
-            [y, xy, 1 - xx + yy - zz, yz],
-            [z, xz, yz, 1 - xx - yy + zz],
-        ]
-    )
-    largest = np.argmax(np.diagonal(outer), axis=1)
-    quaternion = np.moveaxis(outer, -1, 0)[np.arange(len(R)), largest]
-    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    if len(quaternion):
-        quaternion[0] *= np.where(quaternion[0, 0] < 0.0, -1.0, 1.0)
-        turns = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0.0
-        quaternion[1:] *= np.where(np.cumsum(turns) % 2 == 1, -1.0, 1.0)[:, None]
-    return quaternion
+    return PartFrame(unit=unit, X_GP=on_flange(placed, placed.tool.X_FT @ frame.cell.part.X_CP))
 
 
 def _unit(frame: ExportFrame, name: str, *, task: str | None, module: str) -> RapidUnit:

@@ -34,6 +34,7 @@ from cellplan.model.report.exported import (
 from cellplan.model.units import MM
 from cellplan.programs.elements.corners import chosen_shares, moves, row_shares
 from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.frames import on_flange
 from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step, signals_by_key
 from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.joints import from_numbers, to_numbers
@@ -233,19 +234,19 @@ def _data(job: ExportJob, units: Sequence[RapidUnit], unit: RapidUnit, part: Par
         yield f"VAR syncident {SYNC_ON};"
         yield f"VAR syncident {SYNC_OFF};"
     if unit.has_tool:
-        yield f"PERS tooldata {unit.tool} := [TRUE,{frame_text(unit.robot.tool.X_FT, DECIMALS)},{_load(unit)}];"
+        yield f"PERS tooldata {unit.tool} := [TRUE,{frame_text(unit.X_GT, DECIMALS)},{_load(unit)}];"
     if part is not None and works_on_part(job.frame, unit.robot.name):
-        frames = f"{frame_text(pose(), DECIMALS)},{frame_text(part.X_FP, DECIMALS)}"
+        frames = f"{frame_text(pose(), DECIMALS)},{frame_text(part.X_GP, DECIMALS)}"
         yield f'PERS wobjdata {PART} := [FALSE,FALSE,"{part.unit}",{frames}];'
     yield f"CONST speeddata {FROM} := [100,20,100,20];"
     yield f"CONST speeddata {ROWS} := [1000,200,1000,200];"
 
 
 def _load(unit: RapidUnit) -> str:
-    """Load data of a tool: mass in [kg], its centre in the flange frame in [mm], no inertia of its own."""
+    """Load data of a tool: mass in [kg], its centre in the flange of the controller in [mm], no inertia of its own."""
     tool = unit.robot.tool
     mass = UNKNOWN_MASS if tool.mass is None else max(tool.mass, UNKNOWN_MASS)
-    centre: Array = tool.X_FT[:3, 3] if tool.centre is None else tool.centre
+    centre = on_flange(unit.robot, pose(tool.X_FT[:3, 3] if tool.centre is None else tool.centre))[:3, 3]
     place = ",".join(fixed(number, 3) for number in (centre * MM).tolist())
     return f"[{fixed(mass, 3)},[{place}],[1,0,0,0],0,0,0]"
 

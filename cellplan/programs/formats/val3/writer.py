@@ -6,13 +6,13 @@ from functools import partial
 from html import escape
 from typing import Final, NamedTuple
 
-import numpy as np
-
 from cellplan.errors import raise_findings, refusals
-from cellplan.geometry.transforms import Array
+from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, Promise
-from cellplan.model.units import DEG, MM
+from cellplan.model.units import MM
+from cellplan.programs.elements.conventions import CONVENTIONS
 from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.frames import on_flange
 from cellplan.programs.elements.handshake import HandshakeStep
 from cellplan.programs.elements.joints import from_numbers
 from cellplan.programs.elements.pages import PagedProgram, program_paths, render_programs, require_six_axes, robots_of
@@ -132,7 +132,7 @@ def _data(project: PagedProgram, descriptors: Iterable[_Move], signals: Mapping[
     for page, ending in zip(project.pages, project.endings, strict=True):
         lines += _array(f"{JOINTS}{ending}", "jointRx", [_joints(project, row) for row in page])
     lines += _array(MOVE, "mdesc", [_descriptor(move) for move in descriptors])
-    lines += _array(TOOL, "tool", [_tool(project.placed.tool.X_FT)])
+    lines += _array(TOOL, "tool", [_tool(project.placed)])
     return joined([*lines, "  </Datas>", "</Database>"])
 
 
@@ -160,17 +160,11 @@ def _descriptor(move: _Move) -> dict[str, str]:
     return {**shares, "tmax": NO_LIMIT, "rmax": NO_LIMIT, **blend}
 
 
-def _tool(X_FT: Array) -> dict[str, str]:
-    """The tool of the cell on the flange: millimetres, and degrees of turns about x, y and z of the turned frame."""
-    R = X_FT[:3, :3]
-    ry = np.arcsin(np.clip(R[0, 2], -1.0, 1.0))
-    if np.hypot(R[0, 0], R[0, 1]) > 1e-9:  # else the turns about x and z are one: all of it is given to z
-        rx, rz = np.arctan2(-R[1, 2], R[2, 2]), np.arctan2(-R[0, 1], R[0, 0])
-    else:
-        rx, rz = 0.0, np.arctan2(R[1, 0], R[1, 1])
-    values = [*(MM * X_FT[:3, 3]), DEG * rx, DEG * ry, DEG * rz]
-    named = zip(("x", "y", "z", "rx", "ry", "rz"), values, strict=True)
-    return {**{item: fixed(float(value), POSE_DECIMALS) for item, value in named}, "fatherId": FLANGE}
+def _tool(placed: Robot) -> dict[str, str]:
+    """The tool of the cell on the flange of the controller."""
+    numbers = CONVENTIONS["staubli"].numbers(on_flange(placed, placed.tool.X_FT)).tolist()
+    named = zip(CONVENTIONS["staubli"].labels, numbers, strict=True)
+    return {**{item: fixed(value, POSE_DECIMALS) for item, value in named}, "fatherId": FLANGE}
 
 
 def _moves(
