@@ -16,8 +16,8 @@ from cellplan.geometry.transforms import Array, pose_from, quaternion_to_rotatio
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportJob, ProgramRows, Promise
 from cellplan.model.robot.robot import RobotModel
-from cellplan.programs.formats.rapid.targets import configuration
 from cellplan.programs.elements.conventions import quaternions
+from cellplan.programs.formats.rapid.targets import configuration
 from cellplan.programs.formats.rapid.writer import RAPID
 from cellplan.programs.rows.part_targets import joints_of_part_poses, with_part_poses
 

@@ -57,11 +57,7 @@ def stations(run: VerifiedRun | ReadRun) -> dict[str, tuple[Station, ...]]:
             cell = cells[program.phase_at(int(rows[len(rows) // 2])).place]
             task = cell.task(name)
             _join(by_robot.setdefault(task.robot, []), _station(cell, task, program.q[rows]))
-    return {
-        robot.name: _numbered(run.cell, robot, by_robot[robot.name])
-        for robot in run.cell.robots
-        if robot.name in by_robot
-    }
+    return {robot.name: _numbered(robot, by_robot[robot.name]) for robot in run.cell.robots if robot.name in by_robot}
 
 
 def _station(cell: Cell, task: Task, q: Array) -> Station:
@@ -98,7 +94,7 @@ def _is_same(X: Array | None, other: Array | None) -> bool:
     return bool(max(np.abs(X - other)[:3, 3].max(), np.abs(turn).max()) <= SAME_TOL)
 
 
-def _numbered(cell: Cell, robot: Robot, known: Sequence[Station]) -> tuple[Station, ...]:
+def _numbered(robot: Robot, known: Sequence[Station]) -> tuple[Station, ...]:
     """Stations of a robot with the numbers of their frames, in their order; a moving part takes none."""
     control, count = robot.control, sum(station.X is not None for station in known)
     numbers = () if control is None else control.frames
@@ -106,10 +102,9 @@ def _numbered(cell: Cell, robot: Robot, known: Sequence[Station]) -> tuple[Stati
         numbers = (control.base_number,)
     if numbers and len(numbers) < count:
         poses = "; ".join(", ".join(station.tasks) for station in known if station.X is not None)
-        place = cell.origin.at(f"robots.{robot.name}.controller.frames")
         raise InputError(
-            f"{place}: expected {count} numbers, one for each pose of the part in which it works ({poses}), got "
-            f"{len(numbers)}"
+            f"robots.{robot.name}.controller.frames: expected {count} numbers, one for each pose of the part in which it "
+            f"works ({poses}), got {len(numbers)}"
         )
     left = iter(numbers)
     return tuple(station if station.X is None else replace(station, number=next(left, None)) for station in known)

@@ -7,6 +7,7 @@ import pytest
 
 from cellplan.errors import InvalidFileError
 from cellplan.files.cell.load import load_cell
+from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell
 from cellplan.model.settings.controllers import HandshakeEntry
 
@@ -89,3 +90,38 @@ def test_kuka_controllers_have_as_many_tools_and_bases_as_they_have(connected: L
     assert str(caught.value).splitlines() == [
         f"c:6: robots.holder.controller.{key}: expected at most 128, as many as controllers of kind kuka have, got 129"
     ]
+
+
+def test_a_controller_may_count_from_a_base_and_a_flange_of_its_own(connected: Load) -> None:
+    stated = "{id: c1, base: {xyz_mm: [0, 0, 450]}, tool_frame: {}, frames: [3, 1], handshake: "
+
+    control = connected(("{id: c1, handshake: ", stated)).robot("holder").control
+
+    assert control.base.matrix[:3, 3].tolist() == [0.0, 0.0, 0.45]
+    assert control.tool_frame.matrix.tolist() == pose().tolist()
+    assert control.frames == (3, 1)
+    without = connected().robot("holder").control
+    assert (without.base, without.tool_frame, without.frames) == (None, None, ())
+
+
+@pytest.mark.parametrize(
+    ("kind", "frames", "text"),
+    [
+        ("fanuc", "[1, 10]", "[1]: expected at most 9, as many as controllers of kind fanuc have, got 10"),
+        ("kuka", "[129]", "[0]: expected at most 128, as many as controllers of kind kuka have, got 129"),
+        ("yaskawa", "[2, 3, 2]", "[2]: expected each number once, got 2 twice"),
+    ],
+)
+def test_frames_of_the_part_have_numbers_of_their_kind(connected: Load, kind: str, frames: str, text: str) -> None:
+    changes = ("kind: kuka", f"kind: {kind}"), ("{id: c1, handshake: ", f"{{id: c1, frames: {frames}, handshake: ")
+
+    with pytest.raises(InvalidFileError) as caught:
+        connected(*changes)
+
+    assert str(caught.value).splitlines() == [f"c:6: robots.holder.controller.frames{text}"]
+
+
+@pytest.mark.parametrize(("key", "value"), [("frames", "[0]"), ("frames", "3"), ("base", "{x: 1}"), ("base", "[1]")])
+def test_what_is_no_frame_is_refused_by_its_key(connected: Load, key: str, value: str) -> None:
+    with pytest.raises(InvalidFileError, match=rf"^c:6: robots\.holder\.controller\.{key}"):
+        connected(("{id: c1, handshake: ", f"{{id: c1, {key}: {value}, handshake: "))

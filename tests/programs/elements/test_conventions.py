@@ -12,7 +12,13 @@ from cellplan.geometry.transforms import Array, pose_from
 from cellplan.programs.elements.conventions import CELL_FILE, CONVENTIONS, Convention, convention_of
 
 EVERY = {**CONVENTIONS, "other": CELL_FILE}
-SEQUENCES = {"fanuc": "xyz", "yaskawa": "xyz", "other": "xyz", "kuka": "ZYX", "staubli": "XYZ"}  # of scipy: fixed, MOVED
+SEQUENCES = {
+    "fanuc": "xyz",
+    "yaskawa": "xyz",
+    "other": "xyz",
+    "kuka": "ZYX",
+    "staubli": "XYZ",
+}  # of scipy: fixed, MOVED
 POLES = [(30.0, 90.0, 0.0), (-170.0, -90.0, 40.0), (0.0, 90.0, 0.0), (180.0, 0.0, 0.0), (0.0, 180.0, 0.0), (90.0,) * 3]
 
 
@@ -49,9 +55,7 @@ def test_one_rotation_in_all_conventions(kind: str, numbers: tuple[float, ...]) 
 
 def test_a_published_frame_on_a_published_frame_of_staubli_is_the_published_place() -> None:
     staubli = CONVENTIONS["staubli"]
-    cell = staubli.pose(
-        np.array([362.0420374, -49.909946, -265.899982, -0.0000135538, -0.00000434751, 90.0000199962])
-    )
+    cell = staubli.pose(np.array([362.0420374, -49.909946, -265.899982, -0.0000135538, -0.00000434751, 90.0000199962]))
     point = staubli.pose(np.array([169.837325, 700.0334453, 372.398311, -179.999244, -0.000734286, 88.845311]))
 
     result = staubli.numbers(cell @ point)
@@ -78,9 +82,7 @@ def test_quaternions_and_rotation_vectors_are_those_of_another_library(vector: t
 
     assert w >= 0.0
     np.testing.assert_allclose(Rotation.from_quat([*rest, w]).as_matrix(), other.as_matrix(), atol=1e-12)
-    np.testing.assert_allclose(
-        CONVENTIONS["ur"].numbers(placed(other.as_matrix()))[3:], other.as_rotvec(), atol=1e-7
-    )
+    np.testing.assert_allclose(CONVENTIONS["ur"].numbers(placed(other.as_matrix()))[3:], other.as_rotvec(), atol=1e-7)
 
 
 @pytest.mark.parametrize("convention", EVERY.values(), ids=EVERY)
