@@ -103,8 +103,8 @@ def _numbered(robot: Robot, known: Sequence[Station]) -> tuple[Station, ...]:
     if numbers and len(numbers) < count:
         poses = "; ".join(", ".join(station.tasks) for station in known if station.X is not None)
         raise InputError(
-            f"robots.{robot.name}.controller.frames: expected {count} numbers, one for each pose of the part in which it "
-            f"works ({poses}), got {len(numbers)}"
+            f"robots.{robot.name}.controller.frames: expected {count} numbers, one for each pose of the part in which "
+            f"it works ({poses}), got {len(numbers)}"
         )
     left = iter(numbers)
     return tuple(station if station.X is None else replace(station, number=next(left, None)) for station in known)

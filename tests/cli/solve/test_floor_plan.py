@@ -1,10 +1,13 @@
 """``cellplan floorplan`` from the shell: what is said, what is written, how it ends."""
 
 import json
+import shutil
 import sys
+from html import unescape
 from pathlib import Path
 
 import pytest
+from builders.stored_cells import solve_into
 
 from cellplan.cli.main import run
 
@@ -81,3 +84,71 @@ def test_without_the_package_for_dxf_the_message_says_how_to_get_it(
         "error: --format dxf: expected the package ezdxf, got none: pip install 'cellplan[dxf]', or use --format svg\n"
     )
     assert list(tmp_path.iterdir()) == []
+
+
+def connect(folder: Path, source: Path) -> Path:
+    """A copy of the cell whose worker is on a FANUC controller and whose holder is on the same one, and its run."""
+    shutil.copytree(source, folder / "cell")
+    cell = folder / "cell" / "small.yaml"
+    text = cell.read_text()
+    for name, model, control in (
+        ("left", "robots/left.yaml", "{id: r30, tool_frame: {rpy_deg: [0, 0, 90]}}"),
+        ("right", "robots/right.urdf", "{id: r30, base: {xyz_mm: [0, 0, 450]}, tool_frame: {}, frames: [7]}"),
+    ):
+        text = text.replace(f"    model: {model}\n", f"    model: {model}\n    controller: {control}\n")
+        assert name in text
+    cell.write_text(text.replace("part:\n", "controllers: {r30: {kind: fanuc}}\npart:\n", 1))
+    solve_into(cell, folder / "run")
+    return cell
+
+
+def test_frames_are_printed_drawn_and_told_as_the_maker_writes_them(
+    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = connect(tmp_path, sound / "cell")
+    given = ["floorplan", str(tmp_path / "run"), "--cell", str(cell), "--frames"]
+
+    assert run([*given, "-o", str(tmp_path / "plan.svg")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert run([*given, "-o", str(tmp_path / "plan.dxf"), "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert run(["floorplan", str(cell), "--frames", "-o", str(tmp_path / "cell.svg")]) == 0
+    of_cell = capsys.readouterr().out.splitlines()
+
+    right = lines[lines.index("right, r30 (fanuc): X Y Z in mm, W P R in deg") + 1 :][:2]
+    assert [" ".join(line.split()) for line in right] == [
+        "base in floor X 1900.000 Y 300.000 Z 930.000 W 0.000 P 0.000 R 180.000 where it stands",
+        "UFRAME 7 in flange of left X 0.000 Y -120.000 Z 45.000 W 180.000 P 0.000 R -90.000 path",
+    ]  # the grasp is (120, 0, 5) mm from the tip upside down, the tip 40 mm from the flange, which is turned by 90 deg
+    assert "(model)" not in "".join(right)
+    (told,) = [robot for robot in record["frames"] if robot["robot"] == "right"]
+    assert told["remarks"] == []
+    assert told["frames"][1] == {
+        "name": "UFRAME 7",
+        "in": "flange of left",
+        "numbers": {"X": "0.000", "Y": "-120.000", "Z": "45.000", "W": "180.000", "P": "0.000", "R": "-90.000"},
+        "for": "path",
+    }
+    svg, dxf = ((tmp_path / f"plan.{form}").read_text() for form in ("svg", "dxf"))
+    assert 'width="297mm" height="420mm"' in svg
+    assert "on A3," in svg
+    for line in lines[1:]:
+        assert line in unescape(svg)
+        assert line.strip() in dxf
+    assert "  frames of the part follow from a run: solve the cell, and name the folder of the run" not in lines
+    assert not any("UFRAME" in line for line in of_cell)
+
+
+def test_frames_of_a_cell_that_was_not_solved_are_those_that_no_run_decides(
+    cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["floorplan", str(cells / "in_turn.yaml"), "--frames", "-o", str(tmp_path / "plan.svg")]) == 0
+
+    lines = capsys.readouterr().out.splitlines()
+    kuka = lines.index("kuka, krc (kuka): X Y Z in mm, A B C in deg")
+    assert lines[kuka + 1].startswith("  base (model) in floor           X 582.000  Y 2173.000  Z 500.000  A -105.0000")
+    assert lines[kuka + 3 : kuka + 6] == [
+        "  robots.kuka.controller.base is not stated: (model) counts from the base of the model",
+        "  robots.kuka.controller.tool_frame is not stated: (model) counts from the flange of the model",
+        "  frames of the part follow from a run: solve the cell, and name the folder of the run",
+    ]

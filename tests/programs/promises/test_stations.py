@@ -168,3 +168,24 @@ def test_a_verified_run_has_the_frames_of_the_one_that_was_read(sound: Path, mov
     verified = open_gate(sound / "run", cell=sound / "cell" / "small.yaml")
 
     assert stations(verified)["right"][0].tasks == stations(moving)["right"][0].tasks == ("path",)
+
+
+@pytest.mark.slow
+def test_a_welded_frame_has_a_frame_for_each_pose_of_its_table(shared_robots: Path, tmp_path: Path) -> None:
+    """The table turns about the vertical axis, counted against the world; the part stands 680 mm above the floor."""
+    path = shared_robots.parent / "cases" / "welding_frame" / "cell.yaml"
+    cell = load_cell(path, allow_dirs=(shared_robots.parent,))
+    write_run(solve(cell), tmp_path / "run")
+    stored = read_stored_run(tmp_path / "run")
+    read = read_run(stored, load_stored_cell(stored, cell=path, allow_dirs=(shared_robots.parent,)).cell)
+
+    known = stations(read)
+
+    turns = {"f_long": -90.0, "f_short": -180.0, "f_corner1": -135.0, "f_corner2": -45.0}
+    assert [station.tasks for station in known["fanuc"]] == [(name,) for name in turns]
+    for station, turn in zip(known["fanuc"], turns.values(), strict=True):
+        expected = pose((1.25, 0.0, 0.38), (0.0, 0.0, np.deg2rad(-turn - 180.0)))  # the base stands half a turn round
+        np.testing.assert_allclose(station.X, expected, atol=1e-9)
+    (abb,) = known["abb"]
+    assert (abb.holder, abb.tasks) == ("table", ("a_long", "a_short", "a_corner1", "a_corner2"))
+    np.testing.assert_allclose(abb.X, pose((0.0, 0.0, 0.15)), atol=1e-12)
