@@ -1,5 +1,6 @@
 """Displacements of the bases of one layout as variables, so that the kernel and the bodies give their derivatives."""
 
+from collections.abc import Container
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -77,9 +78,9 @@ class BaseDisplacements(VariedFields):
         """The same displacements of another layout, shape (n,)."""
         return replace(self, x=x)
 
-    def layouts(self, d: Array, start: Array) -> Layouts:
+    def layouts(self, d: Array, start: Array, at_work: Container[str] | None = None) -> Layouts:
         """Candidates for the kernel at displacements of shape (K, m), with start postures of shape (K, nq)."""
-        one = self.variables.layouts(self.x[None], start[:1])
+        one = self.variables.layouts(self.x[None], start[:1], at_work)
         shift = self.variables.state(self.x).base_shift(self.variables.base)
         chosen = self.variables.layouts(np.tile(self.x, (len(d), 1)), start).start
         return Layouts(
@@ -89,7 +90,7 @@ class BaseDisplacements(VariedFields):
             weights=np.tile(one.weights, (len(d), 1)),
         )
 
-    def directions(self, d: Array) -> Directions:
+    def directions(self, d: Array, at_work: Container[str] | None = None) -> Directions:  # noqa: ARG002 - of all tasks
         """What each displacement does to a candidate for the kernel."""
         base, nq = self.base_twists(d), self.variables.base.joint_count
         turn = self.variables.state(self.x).base_shift(self.variables.base)[:3, :3]

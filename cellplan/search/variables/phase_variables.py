@@ -1,6 +1,6 @@
 """The variables of a program as one of its phases has them: other starts, and the part where it lies."""
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -18,6 +18,12 @@ from cellplan.search.kernel.varied import VARIED, KernelVariables, VariedFields
 class ProgramVariables(KernelVariables, LayoutVariables, Protocol):
     """Variables of a whole program."""
 
+    def layouts(self, x: Array, start: Array, at_work: Container[str] | None = None) -> Layouts:
+        """See ``Variables``."""
+
+    def directions(self, x: Array, at_work: Container[str] | None = None) -> Directions:
+        """See ``Variables``."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PhaseVariables(VariedFields):
@@ -26,19 +32,20 @@ class PhaseVariables(VariedFields):
     whole: ProgramVariables  # the variables of the program
     begins_there: bool  # whether it begins where variables of the start say
     lying: Part | None = None  # the part where it lies in the cell
+    tasks: tuple[str, ...] = ()  # names of its tasks, whose spins count
 
     def __post_init__(self) -> None:
         """Note what the variables of the program know."""
         derive(self, **{name: getattr(self.whole, name) for name in VARIED})
 
-    def layouts(self, x: Array, start: Array) -> Layouts:
+    def layouts(self, x: Array, start: Array, at_work: Container[str] | None = None) -> Layouts:
         """See ``KernelVariables``."""
-        layouts = self.whole.layouts(x, start)
+        layouts = self.whole.layouts(x, start, self.tasks if at_work is None else at_work)
         return layouts if self.begins_there else replace(layouts, start=start)
 
-    def directions(self, x: Array) -> Directions:
+    def directions(self, x: Array, at_work: Container[str] | None = None) -> Directions:
         """See ``KernelVariables``."""
-        directions = self.whole.directions(x)
+        directions = self.whole.directions(x, self.tasks if at_work is None else at_work)
         return directions if self.begins_there else replace(directions, start=np.zeros_like(directions.start))
 
     def placed(self, x: Array) -> Cell:

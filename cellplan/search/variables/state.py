@@ -1,7 +1,7 @@
 """One layout: poses, rods, start postures and weights that a search may change, at given numbers."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -135,11 +135,15 @@ class State:
             return np.eye(4)
         return cell.part.X_WP @ inverse(pose_of(self.part))
 
-    def tip_shift(self, cell: Cell, index: int) -> Array:
-        """What a changed spin and a changed grasp do to the tool tip of a robot, seen from the tip, shape (4, 4)."""
+    def tip_shift(self, cell: Cell, index: int, at_work: Container[str] | None = None) -> Array:
+        """What a changed spin and a changed grasp do to the tool tip of a robot, seen from the tip, shape (4, 4).
+
+        Args:
+            at_work: Names of the tasks whose spins count; None for all of them.
+        """
         shift, name = np.eye(4), cell.robots[index].name
         for task, spin in zip(cell.tasks, self.spins.tolist(), strict=True):
-            if task.robot == name:
+            if task.robot == name and (at_work is None or task.name in at_work):
                 shift[:3, :3] = rotation_about(Z, task.spin - spin)
         for grasp, six in zip(cell.part.held_by, self.grasps, strict=True):
             if grasp.robot == name:

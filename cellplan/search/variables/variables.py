@@ -14,6 +14,7 @@ from cellplan.model.cell.layout import LayoutSettings, VariableKind, VaryRange
 from cellplan.search.distances.moving_bodies import NeighbourCells
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
+from cellplan.search.kernel.varied import VARIED
 from cellplan.search.variables.pedestals import leaving_columns, with_pedestals
 from cellplan.search.variables.state import State, concerned, pose_of
 from cellplan.search.variables.ties import Tied
@@ -85,7 +86,7 @@ class Variables:
         """
         return self.state(x).cell(self.base, self.tied.ranges)
 
-    def layouts(self, x: Array, start: Array) -> Layouts:
+    def layouts(self, x: Array, start: Array, at_work: Container[str] | None = None) -> Layouts:
         """Candidates for the kernel, with a job of ``base``.
 
         The kernel knows no grasp, spin or part at rest: there the tool tip of a robot or the bases of all robots are
@@ -94,6 +95,7 @@ class Variables:
         Args:
             x: Values of the variables, shape (K, n).
             start: Start postures in [rad] or [m], shape (K, nq); those among the variables are taken from x.
+            at_work: Names of the tasks of one phase of a program; None for all.
         """
         base, states = self.base, [self.state(row) for row in x]
         chosen = np.array([state.starts for state in states])
@@ -103,7 +105,7 @@ class Variables:
         for robot in concerned(base, ranges, VariableKind.BASE, VariableKind.PART):
             X_WB[:, robot] = [state.base_shift(base) @ pose_of(state.bases[robot]) for state in states]
         for robot in concerned(base, ranges, VariableKind.TOOL, VariableKind.GRASP, VariableKind.SPIN):
-            X_FT[:, robot] = [state.tip(base, robot) @ state.tip_shift(base, robot) for state in states]
+            X_FT[:, robot] = [state.tip(base, robot) @ state.tip_shift(base, robot, at_work) for state in states]
         return Layouts(
             X_WB=X_WB,
             X_FT=X_FT,
@@ -111,8 +113,8 @@ class Variables:
             weights=np.array([state.weights for state in states]),
         )
 
-    def directions(self, x: Array) -> Directions:
-        """What each variable does to a candidate for the kernel, at values of shape (n,)."""
+    def directions(self, x: Array, at_work: Container[str] | None = None) -> Directions:
+        """What each variable does to a candidate for the kernel, at values of shape (n,); see ``layouts``."""
         state, cell, ranges, factors = self.state(x), self.base, self.tied.ranges, self.tied.factors
         start, weights = np.zeros((cell.joint_count, len(ranges))), np.zeros((cell.joint_count, len(ranges)))
         for column, variable in enumerate(ranges):
@@ -122,7 +124,7 @@ class Variables:
                 (start if is_start else weights)[joint, column] = 1.0 if is_start else state.weights[joint]
         return Directions(
             base=effective_base_twists(state, cell, ranges) @ factors,
-            tool=tip_twists(state, cell, ranges) @ factors,
+            tool=tip_twists(state, cell, ranges, at_work) @ factors,
             start=start @ factors,
             weights=weights @ factors,
         )
@@ -175,7 +177,7 @@ class Variables:
 
 def _varied(tied: Tied) -> dict[str, Any]:
     """What variables have from their ties."""
-    return {name: getattr(tied, name) for name in ("names", "lower", "upper", "given", "scale", "cost")}
+    return {name: getattr(tied, name) for name in VARIED}
 
 
 def base_twists(state: State, cell: Cell, ranges: Sequence[VaryRange]) -> Array:
@@ -206,14 +208,16 @@ def part_twists(state: State) -> Array:
     return about_origin(pose_twists(state.part[3:]), state.part[:3])
 
 
-def tip_twists(state: State, cell: Cell, ranges: Sequence[VaryRange]) -> Array:
+def tip_twists(state: State, cell: Cell, ranges: Sequence[VaryRange], at_work: Container[str] | None = None) -> Array:
     """Motion of each tool tip as the kernel sees it: of its origin in the flange frame, shape (robots, 6, m)."""
     by_robot = np.zeros((len(cell.robots), 6, len(ranges)))
     kinds = (VariableKind.TOOL, VariableKind.SPIN, VariableKind.GRASP)
     for robot, columns in _by_robot(cell, ranges, *kinds).items():
-        tip = (state.tip(cell, robot) @ state.tip_shift(cell, robot))[:3, 3]
+        tip = (state.tip(cell, robot) @ state.tip_shift(cell, robot, at_work))[:3, 3]
         twists = np.array([_tip_twist(state, cell, robot, ranges[column]) for column in columns]).reshape(-1, 6)
         by_robot[robot][:, columns] = at_point(twists, tip).T
+    is_out = [it.kind is VariableKind.SPIN and at_work is not None and it.name not in at_work for it in ranges]
+    by_robot[:, :, is_out] = 0.0
     return by_robot
 
 

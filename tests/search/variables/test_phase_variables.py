@@ -1,4 +1,4 @@
-"""The grasp of a program: in every phase the holder stands as a plan has it, and distances have its derivatives."""
+"""The grasp and the spins of a program: robots stand as a plan has them in every phase, and derivatives are exact."""
 
 from pathlib import Path
 
@@ -14,14 +14,16 @@ from cellplan.search.programs.objective import Effort, Objective
 from cellplan.search.programs.program_problem import ProgramProblem
 from cellplan.search.programs.rows import Linear
 
-VARY = "layout: {vary: {'part.held_by[0].at': {x_mm: [-40, 40], z_mm: [60, 140], yaw_deg: [-20, 20]}}}\n"
+GRASP = "'part.held_by[0].at': {x_mm: [-40, 40], z_mm: [60, 140], yaw_deg: [-20, 20]}"
+SPINS = "tasks.seam.spin_deg: [-30, 30], tasks.ring.spin_deg: [-30, 30]"
 EFFORT = Effort(keys=3)
+CHANGE = np.array([0.01, 0.015, 0.1, 0.15, -0.25])  # [m] and [rad]
 
 
 @pytest.fixture(scope="module")
 def ready(tmp_path_factory: pytest.TempPathFactory) -> PreparedSearch:
     path: Path = tmp_path_factory.mktemp("grasp") / "cell.yaml"
-    path.write_text(PICK_AND_PLACE + VARY)
+    path.write_text(f"{PICK_AND_PLACE}layout: {{vary: {{{GRASP}, {SPINS}}}}}\n")
     return prepared(LayoutRequest(cell=path, objective=Objective.CYCLE))
 
 
@@ -32,7 +34,7 @@ def problem(ready: PreparedSearch) -> ProgramProblem:
 
 
 def test_another_grasp_moves_the_holder_as_a_plan_does(ready: PreparedSearch, problem: ProgramProblem) -> None:
-    x = problem.given + np.array([0.01, 0.015, 0.1])
+    x = problem.given + CHANGE
     point = problem.evaluate(x, ready.given_start)
     assert point is not None
 
@@ -47,13 +49,13 @@ def test_another_grasp_moves_the_holder_as_a_plan_does(ready: PreparedSearch, pr
 
 
 def test_distances_have_the_derivatives_of_their_differences(ready: PreparedSearch, problem: ProgramProblem) -> None:
-    demands, x, step = ready.demands(), problem.given + np.array([0.01, 0.015, 0.1]), 1e-4
+    demands, x, step = ready.demands(), problem.given + CHANGE, 1e-4
     point = problem.evaluate(x, ready.given_start)
     assert point is not None
     linear = Linear.of(problem, Measures.of(problem, point, demands, EFFORT))
     [rows] = [
         rows
-        for rows in linear.rows(demands, EFFORT.reserve, np.ones(3))
+        for rows in linear.rows(demands, EFFORT.reserve, np.ones(len(x)))
         if rows.kind is MeasureKind.DISTANCE and not rows.aim
     ]
     measured = []
@@ -69,3 +71,15 @@ def test_distances_have_the_derivatives_of_their_differences(ready: PreparedSear
     assert known.sum() > 5
     assert np.abs(differences[known]).max() > 0.1
     np.testing.assert_allclose(rows.gradients[known], differences[known], atol=0.02 * np.abs(differences[known]).max())
+
+
+def test_a_spin_turns_the_tool_of_its_task_alone(ready: PreparedSearch, problem: ProgramProblem) -> None:
+    spin = problem.names.index("tasks.ring.spin_deg")
+    point = problem.evaluate(problem.given, ready.given_start)
+    assert point is not None
+
+    by = problem.derivatives(point).q[..., spin]
+
+    turns = [float(np.abs(by[rows]).max()) for rows in problem.transfers.parts]
+    names = [phase.variables.tasks for phase in problem.phases]
+    assert [turn > 0.1 for turn in turns] == ["ring" in tasks for tasks in names]

@@ -213,8 +213,10 @@ def _refusal(range_: VaryRange, context: Context) -> str | None:
             text = _start_refusal(range_, context)
         case VariableKind.SPIN if valid.tasks[name].free:
             text = "expected a task whose spin is prescribed, got one with free: [spin]; leave out one of them"
-        case VariableKind.SPIN if sum(it.robot == valid.tasks[name].robot for it in valid.tasks.values()) > 1:
-            text = "expected a task of a robot that has no other, got one of several"
+        case VariableKind.SPIN if (
+            valid.program is None and [task.robot for task in valid.tasks.values()].count(valid.tasks[name].robot) > 1
+        ):
+            text = "expected a task of a robot that has no other, or a program, got one of several"
         case VariableKind.PART if any(it.relative_to == "world" for it in valid.tasks.values()):
             text = "expected tasks on the part only, got one that is relative to the world"
     return text

@@ -197,4 +197,5 @@ def _variables(variables: Variables, planned: PlannedStage) -> PhaseVariables:
     """The variables as a phase has them."""
     stage = planned.stage
     lying = None if stage.place is None else stage.cell.part
-    return PhaseVariables(whole=variables, begins_there=_begins_there(planned), lying=lying)
+    tasks = tuple(stage.phase.tasks)
+    return PhaseVariables(whole=variables, begins_there=_begins_there(planned), lying=lying, tasks=tasks)
