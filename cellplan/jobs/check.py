@@ -193,6 +193,7 @@ def check_lines(record: Record) -> list[str]:
         (f"controller {name}", controller["kind"], ", ".join(controller["robots"]))
         for name, controller in record["controllers"].items()
     ]
+    controllers += [(f"programs {form}", "nothing missing", "") for form in record.get("for", ())]
     return [
         f"{record['cell']}: {record['status']}",
         f"  {count_text(record['checks'])}",

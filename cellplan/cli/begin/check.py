@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cellplan.cli.options import shared
-from cellplan.cli.options.request import Options
+from cellplan.cli.options.completion import one_of
+from cellplan.cli.options.request import Options, option
 from cellplan.cli.terminal.output import Result
 from cellplan.cli.terminal.progress import Listener, progress_listener
 from cellplan.errors import ExitStatus
@@ -24,6 +25,15 @@ class CheckOptions(Options):
 
     cell: shared.CellFile
     settings: shared.Settings = ()
+    formats: Annotated[
+        tuple[str, ...],
+        option(
+            "--for FORMATS",
+            "Say all that programs in these formats still need of the cell, such as rapid,krl; may be repeated.",
+            autocompletion=one_of("cellplan.programs.dialects:DIALECTS"),
+        ),
+    ] = ()
+    controllers: shared.Controllers = None
     watch: shared.Watch = False
     as_json: shared.AsJson = False
     quiet: shared.Quiet = False
@@ -48,17 +58,21 @@ def check(options: CheckOptions) -> Result:
 def _checked(options: CheckOptions, follow: "Callable[[Cell], None]", progress: Listener) -> Result:
     """Read and check a cell; ``follow`` is called with the cell as soon as it is read."""
     from cellplan.cli.next_steps import after_check
-    from cellplan.files.cell.load import load_cell
+    from cellplan.files.cell.load import load_cell, with_names
     from cellplan.jobs.check import check as check_cell
     from cellplan.jobs.check import check_lines
+    from cellplan.programs.export.several import require_settings
     from cellplan.runs.overrides import with_overrides
 
     given = load_cell(options.cell, allow_dirs=options.allow_dirs)
     follow(given)
-    changed = with_overrides(given, options.settings)
+    named = given if options.controllers is None else with_names(given, options.controllers)
+    changed = with_overrides(named, options.settings)
+    formats = list(dict.fromkeys(name.strip() for text in options.formats for name in text.split(",")))
+    require_settings(changed, formats)
     result = check_cell(changed, progress=progress)
     status = ExitStatus.PASSED if result.passed else ExitStatus.CHECK_FAILED
-    record = _record(result)
+    record = _record(result) | ({"for": formats} if formats else {})
     steps = after_check(options.cell, changed, passed=result.passed, allow_dirs=options.allow_dirs)
     about = {"schema": options.schema, "status": record["status"], "exit": int(status)}
     return Result(status, [*check_lines(record), *steps], {**about, **record})

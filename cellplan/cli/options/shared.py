@@ -1,7 +1,7 @@
 """Arguments and options that several commands share."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cellplan.cli.options.completion import cell_files, one_of, run_folders, task_names
 from cellplan.cli.options.request import argument, option
@@ -15,6 +15,10 @@ OriginalCell = Annotated[
         "The cell file that was solved: it and its files are compared with the run.",
         autocompletion=cell_files,
     ),
+]
+Controllers = Annotated[
+    Path | None,
+    option("--controllers FILE", "Names of tasks, signals, tools and frames in place of those of the cell (YAML)."),
 ]
 AllowDirs = Annotated[
     tuple[Path, ...],
@@ -89,3 +93,8 @@ Scheduler = Annotated[
     ),
 ]
 Solvers = Annotated[int | None, option("--workers N", "Processes that solve (default: one for each processor).", min=1)]
+
+
+def sources(options: Any) -> dict[str, Any]:
+    """Files beside a run that it is compared with, or named by, as arguments of ``open_gate``."""
+    return {"cell": options.cell, "controllers": options.controllers, "allow_dirs": options.allow_dirs}

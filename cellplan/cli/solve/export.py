@@ -68,6 +68,7 @@ class ExportOptions(Options):
     ] = None
     cell: shared.OriginalCell = None
     without_cell: shared.WithoutCell = False
+    controllers: shared.Controllers = None
     as_json: shared.AsJson = False
     quiet: shared.Quiet = False
     allow_dirs: shared.AllowDirs = ()
@@ -103,9 +104,7 @@ def export(options: ExportOptions) -> Result:
     unfit = partial(refuse_unfit_run, formats=formats, choice=choice, folder=folder)
     with progress_listener(quiet=options.quiet) as progress:
         try:
-            run = open_gate(
-                options.run, cell=options.cell, allow_dirs=options.allow_dirs, refuse=unfit, progress=progress
-            )
+            run = open_gate(options.run, **shared.sources(options), refuse=unfit, progress=progress)
         except NothingFitsError as nothing:
             return result_of_several(nothing.run, folder, nothing.refused)
         if single:

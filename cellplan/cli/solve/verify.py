@@ -28,6 +28,7 @@ class VerifyOptions(Options):
 
     run: shared.RunDir
     cell: shared.OriginalCell = None
+    controllers: shared.Controllers = None
     of_run: Annotated[
         Path | None,
         option(
@@ -70,7 +71,7 @@ def _verified_run(options: VerifyOptions) -> Result:
     from cellplan.runs.gate.open_gate import open_gate
 
     with progress_listener(quiet=options.quiet) as progress:
-        run = open_gate(options.run, cell=options.cell, allow_dirs=options.allow_dirs, progress=progress)
+        run = open_gate(options.run, **shared.sources(options), progress=progress)
     record = read_record(options.run)
     log_effort(record)
     lines = [
@@ -98,7 +99,7 @@ def _verified_programs(options: VerifyOptions) -> Result:
     require_format(stored.form)
     with progress_listener(quiet=options.quiet) as progress:
         other = partial(refuse_other_run, stored)
-        run = open_gate(source, cell=options.cell, allow_dirs=options.allow_dirs, refuse=other, progress=progress)
+        run = open_gate(source, **shared.sources(options), refuse=other, progress=progress)
         outcome = verify_export(stored, run, progress=progress)
     remarks = [*run.remarks, *outcome.remarks]
     lines = [f"{run.cell.name}: programs verified ({stored.form})", f"  run: {source}"]

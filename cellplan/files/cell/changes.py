@@ -47,10 +47,13 @@ def read_setting(text: str, *, option: str = "--set") -> tuple[str, object]:
     return address, None if value == NOTHING else _as_read(f"value: {value}", f"{option} {address}")
 
 
-def changed(document: YamlDocument, values: Mapping[str, object]) -> YamlDocument:
-    """The document with other values by address, None for a key that is left out; see ``Cell.with_values``."""
+def changed(document: YamlDocument, values: Mapping[str, object], places: Mapping[str, str] = {}) -> YamlDocument:
+    """The document with other values by address, None for a key that is left out; messages name values or their places.
+
+    See ``Cell.with_values``.
+    """
     for address, value in values.items():
-        document = _with_value(document, address, value)
+        document = _with_value(document, address, value, what=places.get(address) or _what(address, value))
     return document
 
 
@@ -59,9 +62,8 @@ def plain_values(values: Mapping[str, object]) -> dict[str, Any]:
     return {address: _plain(value, address) for address, value in values.items()}
 
 
-def _with_value(document: YamlDocument, address: str, value: object) -> YamlDocument:
-    """The document with one other value."""
-    what = _what(address, value)
+def _with_value(document: YamlDocument, address: str, value: object, *, what: str) -> YamlDocument:
+    """The document with one other value, of which messages say what it is."""
     where = f"{document.file} with {what}"
     try:
         steps = _steps(address)

@@ -27,6 +27,7 @@ from cellplan.files.cell.build.mounting import (
 from cellplan.files.cell.build.srdf import apply_srdfs
 from cellplan.files.cell.changes import changed, plain_values
 from cellplan.files.cell.layout.build_layout import read_layout
+from cellplan.files.cell.names import with_stated_names
 from cellplan.files.cell.open_tasks import open_task_findings, open_tasks, unknown_robot_findings, with_first_robots
 from cellplan.files.cell.referenced_files import Sources
 from cellplan.files.cell.rules.path_rules import path_findings
@@ -134,6 +135,17 @@ def load_open_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> tupl
     robots = open_tasks(document.root)
     source = CellFile(document=first, name=path.name, folder=path.parent, allow_dirs=allowed, robots=robots)
     return _read(source, unknown_robot_findings(document)), robots
+
+
+def with_names(cell: Cell, file: Path) -> Cell:
+    """A cell that was read from a file, with the names that another file states for its controllers.
+
+    An ``InvalidFileError`` has all that is wrong with these, one located line each.
+    """
+    source = cell.origin.source
+    if not isinstance(source, CellFile):
+        raise InputError(f"{file}: expected names for a cell that was read from a file, got '{cell.name}'")
+    return _read(replace(source, document=with_stated_names(source.document, file)))
 
 
 def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:

@@ -1,7 +1,7 @@
 """Verified run: controller programs are made from nothing else."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import InitVar, dataclass, replace
+from dataclasses import InitVar, dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -31,6 +31,14 @@ class ReadRun:
     cell: Cell  # the cell that was solved
     motion: Motion  # all rows of the program
     motions: tuple[ReadMotion, ...]  # one for each phase
+    names: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of files of other names than those of the run
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UnsolvedRun:
+    """A cell that was not solved, in place of a run: enough to say what programs need of it whatever its motion."""
+
+    cell: Cell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,6 +77,7 @@ class VerifiedRun(Presented):
         file_count: Files that were compared with the manifest.
         inputs_compared: Names of the files the run rests on that were found unchanged.
         remarks: What to know before relying on the run.
+        names: SHA-256 of files that name tasks, signals, tools and frames otherwise than the run, by name.
     """
 
     folder: Path
@@ -80,6 +89,7 @@ class VerifiedRun(Presented):
     inputs_compared: tuple[str, ...]
     remarks: tuple[str, ...]
     token: InitVar[object]
+    names: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self, token: object) -> None:
         """Refuse construction outside of ``open_gate``, or of a run with a failed check."""
@@ -120,3 +130,6 @@ class VerifiedRun(Presented):
             }
             for rows in places
         )
+
+
+AnyRun = VerifiedRun | ReadRun | UnsolvedRun

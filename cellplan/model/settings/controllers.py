@@ -1,7 +1,8 @@
 """Controllers of a cell, where each robot is connected, and what is demanded when one robot stops."""
 
 import re
-from typing import Annotated, Any, Final, Literal, Self
+from collections.abc import Set
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
@@ -81,6 +82,7 @@ KindName = Literal["abb", "fanuc", "kuka", "reis", "ros", "staubli", "ur", "yask
 class ControllerEntry(Entry):
     """A controller of the cell; robots on different controllers share no clock."""
 
+    NAMES: ClassVar[Set[str]] = frozenset({"tasks"})  # keys that no proof depends on
     kind: KindName = Field(description="Maker of the controller, or what drives the robot.")
     tasks: dict[Identifier, Identifier] = Field(
         default={},
@@ -129,6 +131,9 @@ class HandshakeEntry(Entry):
 class RobotControlEntry(Entry):
     """Where a robot is connected, and how programs of its controller name things."""
 
+    NAMES: ClassVar[Set[str]] = frozenset(
+        {"task", "group", "decimals", "tool_number", "base_number", "frames", "handshake"}
+    )  # keys that no proof depends on
     id: Name = Field(description="Name of its controller under controllers.")
     task: Identifier | None = Field(
         default=None, description="Name of its task among the tasks of the controller; only for kind abb."

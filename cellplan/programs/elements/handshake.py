@@ -28,11 +28,11 @@ def handshake_steps(frame: ExportFrame, robot: str) -> tuple[HandshakeStep, ...]
     Raises:
         InputError: A signal is not stated in the cell.
     """
-    leader, *others = [robot.name for robot in frame.cell.robots]
+    others = _senders(frame, robot)
     if not others:
         return ()
-    signals, leads = _signals(frame, robot), robot == leader
-    inputs = [_input(signals, robot, other) for other in (others if leads else [leader])]
+    signals, leads = _signals(frame, robot), robot == frame.cell.robots[0].name
+    inputs = [_input(signals, robot, other) for other in others]
     steps: list[HandshakeStep] = []
     for is_on in (True, False):
         waits = [HandshakeStep(True, signal, is_on) for signal in inputs]
@@ -64,20 +64,26 @@ def signals_by_key(frame: ExportFrame, robot: str) -> dict[str, str]:
 
 def require_signals(frame: ExportFrame, robot: str) -> None:
     """Require every signal of a robot; the ``InputError`` names all that are not stated in the cell."""
-    names = [robot.name for robot in frame.cell.robots]
-    others = names[1:] if robot == names[0] else names[:1]
+    others = _senders(frame, robot)
     if others:
         stated = _signals(frame, robot)
         raise_findings(refusals(*(partial(_input, stated, robot, other) for other in others)))
+
+
+def _senders(frame: ExportFrame, robot: str) -> list[str]:
+    """Robots whose outputs a robot reads: those of all others if it leads, or else that of the leader."""
+    leader, *others = [robot.name for robot in frame.cell.robots]
+    return others if robot == leader else [leader]
 
 
 def _signals(frame: ExportFrame, robot: str) -> HandshakeEntry:
     """The signals of a robot."""
     control = frame.robot(robot).control
     if control is None or control.handshake is None:
+        inputs = ", ".join(f"{other}: …" for other in _senders(frame, robot))
         raise InputError(
-            f"robots.{robot}.controller.handshake: expected its signals, as its program waits for other robots, "
-            f"got none"
+            f"robots.{robot}.controller.handshake: expected its signals, {{output: …, inputs: {{{inputs}}}}}, as its "
+            "program waits for other robots, got none"
         )
     return control.handshake
 

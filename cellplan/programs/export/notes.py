@@ -32,6 +32,7 @@ def _notes(run: VerifiedRun, prepared: PreparedExport, judgement: Judgement) -> 
     if prepared.dialect.is_rounded:
         yield rounding_line(prepared.job.blend, judgement)
     yield f"run {run.digest}"
+    yield from (f"names {digest}" for digest in run.names.values())
     yield READ_BACK
 
 

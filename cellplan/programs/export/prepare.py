@@ -8,7 +8,7 @@ from typing import Final
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError, raise_findings, refusals
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise, Targets
-from cellplan.model.report.verified_run import ReadRun, VerifiedRun
+from cellplan.model.report.verified_run import AnyRun, ReadRun, UnsolvedRun, VerifiedRun
 from cellplan.model.units import DEG, MM
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.handshake import require_signals
@@ -97,7 +97,7 @@ def _job(
     return job, lead
 
 
-def frame_of(run: VerifiedRun | ReadRun, robots: Sequence[str], promise: Promise, choice: Choice) -> ExportFrame:
+def frame_of(run: AnyRun, robots: Sequence[str], promise: Promise, choice: Choice) -> ExportFrame:
     """What a reader may know of an export of a run."""
     return ExportFrame(
         cell=run.cell,
@@ -109,32 +109,36 @@ def frame_of(run: VerifiedRun | ReadRun, robots: Sequence[str], promise: Promise
     )
 
 
-def refuse_unfit(run: ReadRun, dialect: Dialect, choice: Choice) -> None:
-    """Refuse an export of which the files of a run say already that it cannot be, before anything is verified.
+def refuse_unfit(run: ReadRun | UnsolvedRun, dialect: Dialect, choice: Choice) -> None:
+    """Refuse an export of which the files of a run, or a cell, say already that it cannot be.
 
     Raises:
         InputError: All that is not stated in the cell, or does not fit.
         NotVerifiedError: No promise of the format can be kept with this motion.
     """
     choice.refuse_for(dialect)
-    robots = exported_robots(run.cell, dialect, choice.robots)
+    unmet = list(refusals(partial(exported_robots, run.cell, dialect, choice.robots)))
+    chosen = choice.robots or [robot.name for robot in run.cell.robots]
+    robots = tuple(robot.name for robot in run.cell.robots if robot.control is None and robot.name in chosen)
+    if not unmet:
+        robots = exported_robots(run.cell, dialect, choice.robots)
+    elif not robots:  # or else what those need that have no controller yet is said too
+        raise_findings(unmet)
+    best = promise = choice.promise or dialect.promises[0]
     try:
-        promise = choose_promise(run, dialect, robots, requested=choice.promise).promise
+        best = choose_promise(run, dialect, robots, requested=choice.promise).promise
     except InputError as error:
-        unstated = error.findings if isinstance(error, InvalidFileError) else [error]
-        promise = choice.promise or dialect.promises[0]
+        unmet += error.findings if isinstance(error, InvalidFileError) else [error]
     except NotVerifiedError as error:
+        raise_findings(unmet)
         frame = frame_of(run, robots, choice.promise or dialect.promises[-1], choice)
         needed = {f"  needed too: {finding}": None for finding in unmet_demands(run, dialect, frame, choice)}
         raise NotVerifiedError([*error.findings, *needed]) from None
-    else:
-        unstated = []
-    raise_findings([*unstated, *unmet_demands(run, dialect, frame_of(run, robots, promise, choice), choice)])
+    frame = frame_of(run, robots, promise if unmet else best, choice)
+    raise_findings([*unmet, *unmet_demands(run, dialect, frame, choice)])
 
 
-def unmet_demands(
-    run: VerifiedRun | ReadRun, dialect: Dialect, frame: ExportFrame, choice: Choice
-) -> Iterator[InputError]:
+def unmet_demands(run: AnyRun, dialect: Dialect, frame: ExportFrame, choice: Choice) -> Iterator[InputError]:
     """All that a format still needs of a cell, and choices that do not go with what is promised."""
     if is_at_cycle(dialect, frame.promise):
         if choice.is_thinned:
@@ -142,8 +146,8 @@ def unmet_demands(
         yield from refusals(partial(lead_time, {robot.name: cycle_of(robot) for robot in frame.cell.robots}))
     if frame.promise is Promise.SEQUENCE_ONLY:
         yield from refusals(*(partial(require_signals, frame, robot.name) for robot in frame.cell.robots))
-    rows = max(len(program.times) for program in run_programs(run))
-    yield from refusals(*dialect.demands(frame, rows))
+    rows = max((len(program.times) for program in run_programs(run)), default=0)
+    yield from refusals(lambda: raise_findings(refusals(*dialect.demands(frame, rows))))
 
 
 def _shaped(

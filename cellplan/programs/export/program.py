@@ -46,11 +46,11 @@ TABLES: Final[dict[str, Exporter]] = {
 EXPORTERS: Final[Mapping[str, Dialect | Exporter]] = ChainMap(TABLES, DIALECTS)  # type: ignore[arg-type]
 
 
-def require_format(name: str) -> None:
-    """Refuse a format that does not exist."""
+def require_format(name: str, *, option: str = "--format") -> None:
+    """Refuse a format that does not exist; messages name the option that it belongs to."""
     if name not in EXPORTERS:
         hint = did_you_mean(name, EXPORTERS)
-        raise InputError(f"--format: expected one of {listed(EXPORTERS)}, got '{name}'{hint}")
+        raise InputError(f"{option}: expected one of {listed(EXPORTERS)}, got '{name}'{hint}")
 
 
 def refuse_choice(form: str, choice: Choice) -> None:

@@ -77,6 +77,7 @@ def _record(run: VerifiedRun, name: str, about: Record, files: Mapping[str, str]
         "format": name,
         **about,
         "run": run.digest,
+        **({"names": dict(run.names)} if run.names else {}),
         "versions": versions(),
         "zero": {robot.name: zero_text(robot.model) for robot in run.cell.robots},
         "files": {path: digest(text.encode()) for path, text in files.items()},

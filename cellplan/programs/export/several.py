@@ -2,14 +2,16 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 from cellplan.cache import without_cache
-from cellplan.errors import InputError, NotVerifiedError
+from cellplan.errors import InputError, NotVerifiedError, raise_findings, refusals
 from cellplan.files.input.findings import listed
+from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report.verified_run import ReadRun, VerifiedRun
+from cellplan.model.report.verified_run import ReadRun, UnsolvedRun, VerifiedRun
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.export.choice import Choice, refuse_unknown_robots
 from cellplan.programs.export.prepare import refuse_unfit
@@ -131,6 +133,21 @@ def refuse_unfit_run(run: ReadRun, formats: Mapping[str, bool], choice: Choice, 
                 raise
     if len(refused) == len(formats):
         raise NothingFitsError(run, tuple(refused))
+
+
+def require_settings(cell: Cell, formats: Iterable[str]) -> None:
+    """Require all that a cell has to state for programs in some formats; an ``InputError`` has a line for each."""
+    missing: list[InputError] = []
+    for form in formats:
+        require_format(form, option="--for")
+        dialect = EXPORTERS[form]
+        if isinstance(dialect, Dialect):
+            for finding in refusals(partial(refuse_unfit, UnsolvedRun(cell=cell), dialect, EVERYTHING)):
+                key, _, text = str(finding).partition(": ")
+                is_bare = text == f"expected the controller that plays {form}, got none"
+                cure = f"; state its id, and controllers of kind {listed(dialect.kinds)}" if is_bare else ""
+                missing.append(InputError(f"{cell.origin.at(key)}: for {form}: {text}{cure}"))
+    raise_findings(missing)
 
 
 def refuse_unless_writable(folders: Iterable[Path], run: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any, Final, TypeVar
 
 from cellplan.errors import InputError, InvalidFileError
 from cellplan.files.input.files import digest, read_regular_file
-from cellplan.files.input.findings import did_you_mean, shown
+from cellplan.files.input.findings import did_you_mean, listed, shown
 from cellplan.files.input.json_reader import parse_json, required
 from cellplan.files.run.folder import EXPORT, MANIFEST
 from cellplan.model.report.exported import Promise, Targets
@@ -125,11 +125,18 @@ def read_stored_export(folder: Path) -> StoredExport:
 
 
 def refuse_other_run(stored: StoredExport, run: VerifiedRun | ReadRun) -> None:
-    """Refuse a run that the programs were not made from."""
+    """Refuse a run that the programs were not made from, or other names of controllers."""
     if stored.record["run"] != run.digest:
         raise InputError(
             f"{stored.where}: run: expected {run.digest[:12]}… as of '{run.folder}', got "
             f"{shown(str(stored.record['run'])[:12])}…; the programs were made from another run"
+        )
+    files = (required(stored.record, "names", dict, file=stored.where) if "names" in stored.record else {}, run.names)
+    made, got = (listed(f"'{name}' (SHA-256 {str(sha)[:12]}…)" for name, sha in names.items()) for names in files)
+    if made != got:
+        raise InputError(
+            f"{stored.where}: names: expected those of {made}, with which the programs were made, got those of {got}; "
+            "name that file with --controllers, or a changed cell with --cell, or export the run again"
         )
 
 

@@ -8,7 +8,7 @@ from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.files.input.findings import listed
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.exported import Promise
-from cellplan.model.report.verified_run import ReadRun, VerifiedRun
+from cellplan.model.report.verified_run import AnyRun
 from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.model.task.task import Service
 from cellplan.programs.dialects import DIALECTS
@@ -41,7 +41,7 @@ class _Against(NamedTuple):
 class _Export:
     """What is exported, and what is known of it."""
 
-    run: VerifiedRun | ReadRun
+    run: AnyRun
     dialect: Dialect
     robots: tuple[str, ...]
     skew: RunSkew | None
@@ -55,7 +55,7 @@ class _Export:
 
 
 def choose_promise(
-    run: VerifiedRun | ReadRun,
+    run: AnyRun,
     dialect: Dialect,
     robots: Sequence[str],
     *,

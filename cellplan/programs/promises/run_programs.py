@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell
-from cellplan.model.report.verified_run import ReadRun, VerifiedRun
+from cellplan.model.report.verified_run import AnyRun, UnsolvedRun, VerifiedRun
 from cellplan.model.task.task import Frame
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.programs.elements.timed_rows import are_within
@@ -49,8 +49,10 @@ class RunProgram:
         return is_busy
 
 
-def run_programs(run: VerifiedRun | ReadRun) -> tuple[RunProgram, ...]:
-    """The programs of a run: one from home to home, or one for each of its phases."""
+def run_programs(run: AnyRun) -> tuple[RunProgram, ...]:
+    """The programs of a run: one from home to home, or one for each of its phases; none yet of a cell."""
+    if isinstance(run, UnsolvedRun):
+        return ()
     motion = run.motion
     process = {task: are_within(motion.sigma, stretches) for task, stretches in motion.plan.process.items()}
     return tuple(

@@ -44,6 +44,7 @@ def open_gate(
     folder: Path | str,
     *,
     cell: Path | str | None = None,
+    controllers: Path | str | None = None,
     allow_dirs: Sequence[Path] = (),
     refuse: Callable[[ReadRun], object] | None = None,
     progress: Progress = silent,
@@ -56,6 +57,7 @@ def open_gate(
     Args:
         folder: The run folder.
         cell: The cell file that was solved; None when it is not available.
+        controllers: A file of names of tasks, signals, tools and frames that take the place of those of the cell.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
         refuse: Called when all is read and before anything is verified; raises what speaks against the use of the run.
         progress: Called with the stage and the fraction done.
@@ -66,11 +68,11 @@ def open_gate(
     """
     stored = read_stored_run(Path(folder))
     _refuse_failed(stored)
-    source = load_stored_cell(stored, cell=None if cell is None else Path(cell), allow_dirs=allow_dirs)
+    source = load_stored_cell(stored, cell=cell, allow_dirs=allow_dirs, controllers=controllers)
     demanded = _demanded(source.cell, stored)
     rows = read_rows(stored, source.cell, demanded)
     if refuse is not None:
-        refuse(_read_run(stored, source.cell, demanded, rows))
+        refuse(replace(_read_run(stored, source.cell, demanded, rows), names=source.names))
     scenes = demanded.scenes(source.cell)
     motions = tuple(
         _verified(scene, rows, place, cell=source.cell, progress=progress) for place, scene in enumerate(scenes)
@@ -87,7 +89,6 @@ def open_gate(
     provenance = Provenance(versions=stored.manifest.versions, digests={})
     records = program_records(motions, cell=source.cell, provenance=provenance)
     _refuse_other_report(stored, records, motions)
-    of_pages = _refuse_other_pages(stored, records, motions)
     return VerifiedRun(
         folder=stored.folder,
         digest=stored.digest,
@@ -99,9 +100,10 @@ def open_gate(
         remarks=(
             *source.remarks,
             *_other_versions(stored),
-            *of_pages,
+            *_refuse_other_pages(stored, records, motions),
             *missing_moves(source.cell, {phase.label: phase.tasks for phase in demanded.plan.program}),
         ),
+        names=source.names,
         token=ACCESS_TOKEN,
     )
 

@@ -91,3 +91,80 @@ def test_controllers_are_listed_with_their_robots(
     record = json.loads(capsys.readouterr().out)
     assert record["controllers"] == {"master": {"kind": "other", "robots": ["left", "right"]}}
     assert ["controller", "master", "other", "left,", "right"] in [line.split() for line in check_lines(record)]
+
+
+def check_for(cell: Path, formats: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, list[str]]:
+    """Exit status and lines about a cell of a check for some formats."""
+    status = run(["check", str(cell), "--for", formats, "-q"])
+    out, err = capsys.readouterr()
+    assert (out == "") is (status == 2)
+    return status, (err if status else out).splitlines()
+
+
+def test_all_that_formats_need_is_said_at_once(cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (cells / "in_turn.yaml").read_text(encoding="utf-8")
+    bare = text.replace("kuka: 1, abb: 2, staubli: 3", "abb: 2").replace("task: T_ROB1, ", "")
+    bare = bare.replace(", handshake: {output: doThere, inputs: {reis: diGo}}", "")
+    (cell := tmp_path / "bare.yaml").write_text(bare, encoding="utf-8")
+
+    status, lines = check_for(cell, "krl,val3", capsys)
+
+    expected = [
+        ("reis", ".inputs", "expected the input that 'kuka' sets, got none"),
+        ("reis", ".inputs", "expected the input that 'staubli' sets, got none"),
+        ("abb", "", "expected its signals, {output: …, inputs: {reis: …}}, as its program waits for other robots"),
+        ("staubli", "", "expected its signals, {output: …, inputs: {reis: …}}, as its program waits for other robots"),
+    ]
+    assert status == 2
+    assert len(lines) == 2 * len(expected)
+    numbers = {name: 1 + bare.splitlines().index(f"  {name}:") for name in ("reis", "abb", "staubli")}
+    for line, (form, (robot, key, words)) in zip(
+        lines, [(form, it) for form in ("krl", "val3") for it in expected], strict=True
+    ):
+        assert f": robots.{robot}.controller.handshake{key}: for {form}: {words}" in line
+        at = int(line.removeprefix(f"{cell}:").partition(":")[0])
+        assert numbers[robot] < at <= numbers[robot] + 8
+
+
+def test_nothing_is_missing_of_formats_that_a_cell_can_have(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, lines = check_for(cells / "in_turn.yaml", "krl, rapid,val3,csv,wide", capsys)
+
+    assert status == 0
+    missing = [line.split() for line in lines if line.startswith("  programs ")]
+    assert missing == [["programs", form, "nothing", "missing"] for form in ("krl", "rapid", "val3", "csv", "wide")]
+
+
+def test_tasks_of_a_controller_that_moves_robots_together_are_needed(
+    cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (cells / "multimove.yaml").read_text(encoding="utf-8")
+    (cell := tmp_path / "cell.yaml").write_text(text.replace(", task: T_ROB2", ""), encoding="utf-8")
+
+    status, lines = check_for(cell, "rapid", capsys)
+
+    where = "robots.right.controller.task: for rapid: expected one of the tasks of controller 'irc5' (T_ROB1, T_ROB2, "
+    assert (status, len(lines)) == (2, 1)
+    assert where in lines[0]
+
+
+def test_formats_that_do_not_exist_are_refused_with_those_that_do(
+    cells: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, lines = check_for(cells / "in_turn.yaml", "rapidd", capsys)
+
+    assert (status, len(lines)) == (2, 1)
+    assert lines[0].startswith("error: --for: expected one of csv, json, krl, rapid, ros2, ")
+    assert lines[0].endswith("got 'rapidd', did you mean 'rapid'?")
+
+
+def test_names_of_a_file_count_in_place_of_those_of_the_cell(
+    cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "names.yaml"
+    file.write_text("robots: {abb: {controller: {handshake: {output: do1, inputs: {kuka: di1}}}}}", encoding="utf-8")
+    words = ["check", str(cells / "in_turn.yaml"), "--for", "rapid", "-q", "--controllers", str(file)]
+
+    assert run(words) == 2
+
+    where = f"{cells / 'in_turn.yaml'} with {file}:1: robots.abb.controller.handshake.inputs: for rapid: "
+    assert capsys.readouterr().err == f"{where}expected the input that 'reis' sets, got none\n"

@@ -11,7 +11,7 @@ from cellplan.model.report.exported import ExportFrame, ExportJob, Promise
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.handshake import HandshakeStep
 from cellplan.programs.elements.joints import Axes
-from cellplan.programs.elements.pages import PagedProgram, program_paths, render_programs, require_six_axes, robots_of
+from cellplan.programs.elements.pages import PagedProgram, program_paths, render_programs, require_six_axes
 from cellplan.programs.elements.text import comment, fixed, joined
 from cellplan.programs.formats.krl.reader import read_krl
 from cellplan.programs.formats.krl.text import AXES, EXTERNAL, MODULES, POINT, WHOLE, require_numbers
@@ -36,7 +36,7 @@ def render_krl(job: ExportJob) -> dict[str, str]:
 
 def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
     """What these programs need of the cell."""
-    for robot in robots_of(frame, KRL):
+    for robot in frame.robots:
         yield partial(require_numbers, frame, robot)
         yield partial(require_six_axes, frame.robot(robot), external=EXTERNAL, what="KRL")
 

@@ -15,7 +15,7 @@ from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.frames import on_flange
 from cellplan.programs.elements.handshake import HandshakeStep
 from cellplan.programs.elements.joints import from_numbers
-from cellplan.programs.elements.pages import PagedProgram, program_paths, render_programs, require_six_axes, robots_of
+from cellplan.programs.elements.pages import PagedProgram, program_paths, render_programs, require_six_axes
 from cellplan.programs.elements.text import comment, fixed, joined
 from cellplan.programs.formats.val3.names import (
     BASE,
@@ -64,7 +64,7 @@ def render_val3(job: ExportJob) -> dict[str, str]:
 
 def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
     """What these programs need of the cell."""
-    for robot in robots_of(frame, VAL3):
+    for robot in frame.robots:
         yield partial(require_links, frame, robot)
         yield partial(require_six_axes, frame.robot(robot), external=0, what="VAL3")
 
