@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError, NoSolutionError
-from cellplan.files.cell.load import load_cell
+from cellplan.files.cell.load import load_cell, with_names
 from cellplan.files.run.stored import read_stored_run
 from cellplan.files.run.whole_file import refuse_foreign, replace_older
 from cellplan.geometry.arrays import Array
@@ -51,6 +51,7 @@ class FloorPlanRequest:
         cell: The cell file of a run that depends on further files; None where the folder is enough.
         settings: Values of a cell file, as ``KEY=VALUE``.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+        controllers: A file of names of tools and frames that take the place of those of the cell; None without one.
         frames: Whether it shows the frames to type into the pendants, which a failed run does not have.
     """
 
@@ -60,6 +61,7 @@ class FloorPlanRequest:
     cell: Path | None = None
     settings: Sequence[str] = field(default=())
     allow_dirs: Sequence[Path] = field(default=())
+    controllers: Path | None = None
     frames: bool = False
 
 
@@ -86,9 +88,9 @@ def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = sile
     if request.cell is not None:
         raise InputError(f"--cell: expected a run with it, got '{request.path}'")
     cell = with_overrides(load_cell(request.path, allow_dirs=request.allow_dirs), request.settings)
+    cell = cell if request.controllers is None else with_names(cell, request.controllers)
     _refuse_place(request, cell.name)
-    plan = _of_cell(cell, progress)
-    return replace(plan, pendants=pendant_frames(cell, None)) if request.frames else plan
+    return replace(_of_cell(cell, progress), pendants=pendant_frames(cell, None) if request.frames else ())
 
 
 def target_of(request: FloorPlanRequest, cell: str) -> Path:
@@ -132,15 +134,16 @@ def _of_run(request: FloorPlanRequest) -> FloorPlan:
     """The floor plan of a run on disk."""
     stored = read_stored_run(request.path)
     _refuse_place(request, stored.manifest.cell)
-    cell = load_stored_cell(stored, cell=request.cell, allow_dirs=request.allow_dirs).cell
+    cell = load_stored_cell(
+        stored, cell=request.cell, allow_dirs=request.allow_dirs, controllers=request.controllers
+    ).cell
+    pendants = pendant_frames(cell, stations(read_run(stored, cell))) if request.frames else ()
     read = [stored_series(stored, place, cell) for place in stored.records]
     motions = [_by_robot(cell, q) for _, q in read]
     start = {name: q[0] for name, q in motions[0].items()}
     whole = sum(float(times[-1]) for times, _ in read)
     plan = floor_plan(cell, start, motions, _task_points(cell), state=swept_state(whole))
-    if not request.frames:
-        return plan
-    return replace(plan, pendants=pendant_frames(cell, stations(read_run(stored, cell))))
+    return replace(plan, pendants=pendants)
 
 
 def _of_cell(cell: Cell, progress: Progress) -> FloorPlan:

@@ -35,6 +35,7 @@ class FloorPlanOptions(Options):
         ),
     ] = False
     cell: shared.OriginalCell = None
+    controllers: shared.Controllers = None
     settings: shared.Settings = ()
     as_json: shared.AsJson = False
     quiet: shared.Quiet = False

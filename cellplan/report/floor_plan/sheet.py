@@ -185,13 +185,13 @@ def _height(plan: FloorPlan) -> int:
 
 
 def _frames(plan: FloorPlan, sheet: Sheet) -> Iterator[str]:
-    """Fixed frames of the part: their x and y axes, and the names of those at one place below it."""
+    """Fixed frames of the part: their x and y axes, and the names of those at one place above it."""
     for place, frames in plan.fixed_frames.items():
         x, y = sheet.place(np.array(place))
         for axes in (frame[:2, :2] * AXES for frame in frames.values()):
             (a, b), (c, d) = (axes * [[1.0], [-1.0]] + [[x], [y]]).T.tolist()
             yield f'<path class="cross" d="M{a:.1f} {b:.1f}L{x:.1f} {y:.1f}L{c:.1f} {d:.1f}"/>'
-        yield _text("thing", x, y + 34, ", ".join(frames))
+        yield _text("thing", x, y - 72, ", ".join(frames))
 
 
 def _dimension(dimension: Dimension, sheet: Sheet) -> Iterator[str]:

@@ -1,8 +1,10 @@
 """``cellplan floorplan`` from the shell: what is said, what is written, how it ends."""
 
 import json
+import re
 import shutil
 import sys
+from collections.abc import Iterator
 from html import unescape
 from pathlib import Path
 
@@ -137,6 +139,32 @@ def test_frames_are_printed_drawn_and_told_as_the_maker_writes_them(
         assert line.strip() in dxf
     assert "  frames of the part follow from a run: solve the cell, and name the folder of the run" not in lines
     assert not any("UFRAME" in line for line in of_cell)
+    assert [*svg_frames(svg)] == []  # the part goes with the flange of the holder: no fixed frame is drawn
+
+    (names := tmp_path / "names.yaml").write_text("robots: {right: {controller: {frames: [5]}}}\n")
+    assert run([*given, "--controllers", str(names), "-o", str(tmp_path / "plan.svg")]) == 0
+    assert "  UFRAME 5 in flange of left" in capsys.readouterr().out
+
+
+def test_a_run_that_failed_has_no_frames_to_type(
+    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(sound / "cell", tmp_path / "cell")
+    cell = tmp_path / "cell" / "small.yaml"
+    cell.write_text(f"{cell.read_text()}checks: {{clearance_mm: 900}}\n")
+    solve_into(cell, tmp_path / "run")
+    given = ["floorplan", str(tmp_path / "run"), "--cell", str(cell), "-o", str(tmp_path / "plan.svg")]
+
+    assert run([*given, "--frames"]) == 1
+    out, err = capsys.readouterr()
+    assert (out, "the run failed: clearance" in err) == ("", True)
+    assert not (tmp_path / "plan.svg").exists()
+    assert run(given) == 0
+
+
+def svg_frames(svg: str) -> Iterator[str]:
+    """Names at fixed frames of the part in a drawing."""
+    yield from re.findall(r'<text class="thing"[^>]*>([^<]*(?:UFRAME|BASE_DATA|frame)[^<]*)<', svg)
 
 
 def test_frames_of_a_cell_that_was_not_solved_are_those_that_no_run_decides(

@@ -17,6 +17,7 @@ from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Obstacle
 from cellplan.report.floor_plan.dxf import floor_plan_dxf
+from cellplan.report.floor_plan.pendants import PlanFrame, PlanPendant
 from cellplan.report.floor_plan.plan import FloorPlan
 from cellplan.report.floor_plan.sheet import UNIT, floor_plan_svg, laid_out
 from cellplan.runs.drawings.floor_plan import floor_plan
@@ -154,3 +155,58 @@ def test_names_and_numbers_of_the_table_leave_each_other_room(plan: FloorPlan) -
             rows.setdefault(entry.get("y"), []).append(box)
     assert sorted(map(len, rows.values()))[-4:] == [5, 6, 6, 6]  # the long name has a line for itself
     assert all(left[1] <= right[0] for row in rows.values() for left, right in pairwise(sorted(row)))
+
+
+def with_frames(plan: FloorPlan, count: int) -> FloorPlan:
+    """The plan with frames of the part to type, at two places in turns."""
+    frames = tuple(
+        PlanFrame(
+            name=f"UFRAME {number}",
+            seen_from="base",
+            numbers=(f"{number}.000",),
+            purpose="seam & more" * 20,
+            X_W=pose((0.5 * (number % 2), 0.25, 0.1), (0.0, 0.0, np.pi / 2)),
+        )
+        for number in range(1, count + 1)
+    )
+    pendant = PlanPendant(robot="kuka", title="kuka", labels=("X",), frames=frames, remarks=("mind this",))
+    return replace(plan, pendants=(pendant,))
+
+
+def test_frames_to_type_make_the_sheet_longer_and_leave_the_plan_as_it_is(plan: FloorPlan) -> None:
+    plain, few, many = (floor_plan_svg(with_frames(plan, n) if n else plan) for n in (0, 4, 90))
+
+    heights = [float(ET.fromstring(text).get("viewBox").split()[3]) for text in (plain, few, many)]  # noqa: S314
+    assert heights[:2] == [2100.0, 4200.0]
+    for text, height in ((few, heights[1]), (many, heights[2])):
+        ends = [float(entry.get("y")) for entry in ET.fromstring(text).iter(f"{NS}text")]  # noqa: S314 - our own text
+        assert 2100.0 < max(ends) < height - 80.0
+    assert heights[2] > 4200.0
+    gone = set(plain.splitlines()[8:]) - set(few.splitlines())
+    assert sorted(line.partition(" class=")[0] for line in gone) == ["<rect", "<text"]  # the paper, and what it is
+
+
+def test_fixed_frames_of_the_part_are_drawn_where_they_are(plan: FloorPlan) -> None:
+    framed = with_frames(plan, 4)
+    sheet, root = laid_out(framed), ET.fromstring(floor_plan_svg(framed))  # noqa: S314 - our own text
+
+    labels = {entry.text: (float(entry.get("x")), float(entry.get("y"))) for entry in root.iter(f"{NS}text")}
+    for names, place in (("UFRAME 1, UFRAME 3", (500.0, 250.0)), ("UFRAME 2, UFRAME 4", (0.0, 250.0))):
+        x, y = sheet.place(np.array(place))
+        assert labels[names] == pytest.approx((x, y - 72.0), abs=0.1)
+        turned = f"M{x:.1f} {y - 60.0:.1f}L{x:.1f} {y:.1f}L{x - 36.0:.1f} {y:.1f}"  # x axes point to +y, y axes to -x
+        assert sum(path.get("d") == turned for path in root.iter(f"{NS}path")) == 2
+
+
+def test_the_drawing_has_the_frames_to_type_as_texts(plan: FloorPlan) -> None:
+    document = drawing(with_frames(plan, 2))
+
+    texts = [entry.dxf.text for entry in document.modelspace().query("TEXT")]
+    assert [text.strip() for text in texts if text.startswith(("kuka", "  "))][-4:] == [
+        "kuka",
+        f"UFRAME 1 in base  X 1.000  {'seam & more' * 20}",
+        f"UFRAME 2 in base  X 2.000  {'seam & more' * 20}",
+        "mind this",
+    ]
+    lines = document.modelspace().query("LINE[layer=='part']")
+    assert {(round(line.dxf.start.x), round(line.dxf.start.y)) for line in lines} == {(500, 250), (0, 250)}
