@@ -9,6 +9,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.jobs.fastest.timed_program import TimedProgram
 from cellplan.jobs.layout.finish.finish import CandidateResult, Finish, certified_cell
@@ -101,12 +103,17 @@ class _Search:
         return replace(study, propose=self.proposals, enough=is_enough)
 
     def _best(self, finished: Finished) -> CandidateResult | None:
-        """The first candidate that passes, best first; of programs, whose transfers are estimates, the fastest one."""
+        """The first candidate that passes, best first; of programs, whose transfers are estimates, the fastest one.
+
+        Those whose estimate is longer than a certified program are not solved.
+        """
         passed = list[CandidateResult]()
         is_estimate = self.ready.phases is not None and self.request.objective is Objective.CYCLE
         is_estimate = is_estimate and self.ready.variables.settings.misplacement is None
         for finalist in self.finish.ordered(self.candidates(finished))[:CANDIDATES]:
             number = finalist.trial.number
+            if is_estimate and finalist.trial.figures["cycle_s"] > min((one.cycle for one in passed), default=np.inf):
+                break
             if number not in self.tried:
                 self.progress(f"certifying trial {number}", 1.0)
                 self.tried[number] = self.finish.certified(finalist)

@@ -1,7 +1,8 @@
 """A search of a program from end to end, and what is refused of programs."""
 
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from builders.home_to_home import PICK_AND_PLACE
@@ -9,9 +10,12 @@ from builders.study_trials import InThisProcess
 
 from cellplan import LayoutRequest, Stop, load_cell, search_layout, solve
 from cellplan.errors import InputError
+from cellplan.jobs.layout.search import _Search
 from cellplan.jobs.layout.trials.searched import searched_cell
+from cellplan.model.progress import silent
 from cellplan.search.programs.objective import CycleTiming, Objective
 
+VARIANT = SimpleNamespace(values={"kind": "given"})
 CELL = Path(__file__).resolve().parents[3] / "cells" / "three_tasks_each.yaml"
 
 
@@ -69,6 +73,40 @@ def test_a_program_keeps_its_demands_with_misplaced_bases(tmp_path: Path, monkey
         displaced = solve(best.with_values({"robots.pen.base.x_mm": x}))
         assert displaced.passed
         assert displaced.motion.times[-1] <= record["cycle_s"] + 1e-9
+
+
+def test_a_program_whose_estimate_is_longer_than_a_certified_one_is_not_solved() -> None:
+    certified = {0: 9.0, 1: 8.5, 2: 8.2}
+    finalists = [
+        SimpleNamespace(trial=SimpleNamespace(number=number, passed=True, figures={"cycle_s": cycle}, variant=VARIANT))
+        for number, cycle in enumerate([8.0, 8.8, 8.9, 8.95])
+    ]
+    finish = SimpleNamespace(
+        ordered=lambda _: finalists,
+        certified=lambda finalist: SimpleNamespace(
+            trial=finalist.trial.number, passed=True, cycle=certified[finalist.trial.number]
+        ),
+        learned=lambda _, result: result,
+    )
+    ready = SimpleNamespace(phases=True, variables=SimpleNamespace(settings=SimpleNamespace(misplacement=None)))
+    nothing: Any = None
+    search = _Search(
+        request=LayoutRequest(cell=CELL),
+        folder=nothing,
+        ready=cast("Any", ready),
+        workers=1,
+        stop=Stop(trials=1),
+        progress=silent,
+        finish=cast("Any", finish),
+        proposals=nothing,
+    )
+    finished = SimpleNamespace(trials=[it.trial for it in finalists])
+
+    best = search._best(cast("Any", finished))
+
+    assert best is not None
+    assert best.trial == 1
+    assert sorted(search.tried) == [0, 1]
 
 
 def _refusal(**changes: object) -> str:
