@@ -66,10 +66,10 @@ class Convention:
 
     def texts(self, X: Array) -> tuple[str, ...]:
         """Numbers of a pose as they are typed; a half turn is a positive one."""
-        texts = [
-            fixed(number, LENGTH_DECIMALS if at < 3 else self.decimals) for at, number in enumerate(self.numbers(X))
-        ]
-        return tuple(fixed(180.0, self.decimals) if text == fixed(-180.0, self.decimals) else text for text in texts)
+        lengths = [fixed(length, LENGTH_DECIMALS) for length in MM * X[:3, 3]]
+        turns = [fixed(number, self.decimals) for number in self.turn(X[:3, :3])]
+        half = fixed(-180.0, self.decimals)
+        return (*lengths, *(turn.removeprefix("-") if turn == half else turn for turn in turns))
 
 
 def quaternions(R: Array) -> Array:
@@ -121,15 +121,10 @@ CONVENTIONS: Final = {
         unit="",
     ),
     "fanuc": replace(
-        CELL_FILE,
-        labels=("X", "Y", "Z", "W", "P", "R"),
-        tool="UTOOL {}",
-        frame="UFRAME {}",
-        decimals=3,
-        has_numbers=True,
+        CELL_FILE, labels=tuple("XYZWPR"), tool="UTOOL {}", frame="UFRAME {}", decimals=3, has_numbers=True
     ),
     "kuka": Convention(  # turns in [deg] about z, the turned y and the turned x
-        labels=("X", "Y", "Z", "A", "B", "C"),
+        labels=tuple("XYZABC"),
         turn=lambda R: DEG * rpy_from_rotation(R)[::-1],
         rotation=lambda turns: rotation_from_rpy(turns[::-1] / DEG),
         tool="TOOL_DATA[{}]",

@@ -117,3 +117,14 @@ def test_tools_and_frames_have_their_numbers_or_a_question_mark() -> None:
 
     assert [fanuc.named(fanuc.frame, number) for number in (3, None)] == ["UFRAME 3", "UFRAME ?"]
     assert [abb.named(abb.tool, number) for number in (3, None)] == ["tooldata 3", "tooldata"]
+
+
+@pytest.mark.parametrize("kind", CONVENTIONS)
+def test_a_half_turn_is_a_positive_one_and_a_length_keeps_its_sign(kind: str) -> None:
+    R = axis_turn("z", -180.0 + 1e-9)
+
+    texts = CONVENTIONS[kind].texts(pose_from(R, np.array([-0.18, 0.18, -0.0])))
+
+    assert texts[:3] == ("-180.000", "180.000", "0.000")
+    if CONVENTIONS[kind].unit == "deg":
+        assert {float(text) for text in texts[3:]} == {0.0, 180.0}
