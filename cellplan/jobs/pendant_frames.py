@@ -34,18 +34,18 @@ def _of_robot(cell: Cell, robot: Robot, known: Sequence[Station] | None) -> Plan
         robot=robot.name,
         title=f"{robot.name}, {connected}: {' '.join(convention.labels[:3])} in mm{turns}",
         labels=convention.labels,
-        frames=(*_of_robot_itself(robot, convention), *_of_part(cell, robot, convention, known or ())),
+        frames=(*_of_robot_itself(cell, robot, convention), *_of_part(cell, robot, convention, known or ())),
         remarks=tuple(_remarks(cell, robot, convention, known)),
     )
 
 
-def _of_robot_itself(robot: Robot, convention: Convention) -> Iterator[PlanFrame]:
+def _of_robot_itself(cell: Cell, robot: Robot, convention: Convention) -> Iterator[PlanFrame]:
     """Its base on the floor, and its tool unless it only turns parts."""
     X_WC = controller_base(robot)
     yield PlanFrame(
         name=_origin(robot, "base"), seen_from="floor", numbers=convention.texts(X_WC), purpose="where it stands"
     )
-    if Axes.of(robot).arm:
+    if _has_tool(cell, robot):
         number = None if robot.control is None else robot.control.tool_number
         yield PlanFrame(
             name=convention.named(convention.tool, number),
@@ -53,6 +53,11 @@ def _of_robot_itself(robot: Robot, convention: Convention) -> Iterator[PlanFrame
             numbers=convention.texts(on_flange(robot, robot.tool.X_FT)),
             purpose="tip of the tool",
         )
+
+
+def _has_tool(cell: Cell, robot: Robot) -> bool:
+    """Whether it has a tool centre point: it works, or has an arm, and does not only turn parts."""
+    return bool(Axes.of(robot).arm) or any(task.robot == robot.name for task in cell.tasks)
 
 
 def _of_part(cell: Cell, robot: Robot, convention: Convention, known: Sequence[Station]) -> Iterator[PlanFrame]:
@@ -81,12 +86,12 @@ def _states(robot: Robot, key: str) -> bool:
 
 def _remarks(cell: Cell, robot: Robot, convention: Convention, known: Sequence[Station] | None) -> Iterator[str]:
     """What to know of the numbers of a robot."""
-    needed = dict.fromkeys((robot.name, key) for key in ORIGINS if key == "base" or Axes.of(robot).arm)
+    needed = dict.fromkeys((robot.name, key) for key in ORIGINS if key == "base" or _has_tool(cell, robot))
     needed |= dict.fromkeys((station.holder, "tool_frame") for station in known or () if station.holder is not None)
     for name, key in needed:
         if not _states(cell.robot(name), key):
             yield f"robots.{name}.controller.{key} is not stated: (model) counts from the {ORIGINS[key]} of the model"
     if convention.has_numbers and any(station.X is not None and station.number is None for station in known or ()):
         yield f"robots.{robot.name}.controller.frames does not state a number for each frame of the part"
-    if known is None and Axes.of(robot).arm:
+    if known is None and _has_tool(cell, robot):
         yield NO_RUN

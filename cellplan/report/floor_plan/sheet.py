@@ -174,7 +174,7 @@ def _pendants(plan: FloorPlan) -> Iterator[str]:
     if plan.pendants:
         yield _text("title", MARGIN, UNIT * HEIGHT_MM + MARGIN, "Frames to type into the pendants")
     for number, words in enumerate(pendant_lines(plan.pendants), start=2):
-        yield _text("typed", MARGIN, UNIT * HEIGHT_MM + MARGIN + TYPED * number, shortened(words, TYPED_LETTERS))
+        yield _text("typed", MARGIN, UNIT * HEIGHT_MM + MARGIN + TYPED * number, words[:TYPED_LETTERS])
 
 
 def _height(plan: FloorPlan) -> int:

@@ -117,15 +117,16 @@ def test_frames_are_printed_drawn_and_told_as_the_maker_writes_them(
     assert run(["floorplan", str(cell), "--frames", "-o", str(tmp_path / "cell.svg")]) == 0
     of_cell = capsys.readouterr().out.splitlines()
 
-    right = lines[lines.index("right, r30 (fanuc): X Y Z in mm, W P R in deg") + 1 :][:2]
+    right = lines[lines.index("right, r30 (fanuc): X Y Z in mm, W P R in deg") + 1 :][:3]
     assert [" ".join(line.split()) for line in right] == [
         "base in floor X 1900.000 Y 300.000 Z 930.000 W 0.000 P 0.000 R 180.000 where it stands",
+        "UTOOL ? in flange X 0.000 Y 0.000 Z 40.000 W 0.000 P 0.000 R 0.000 tip of the tool",
         "UFRAME 7 in flange of left X 0.000 Y -120.000 Z 45.000 W 180.000 P 0.000 R -90.000 path",
     ]  # the grasp is (120, 0, 5) mm from the tip upside down, the tip 40 mm from the flange, which is turned by 90 deg
     assert "(model)" not in "".join(right)
     (told,) = [robot for robot in record["frames"] if robot["robot"] == "right"]
     assert told["remarks"] == []
-    assert told["frames"][1] == {
+    assert told["frames"][2] == {
         "name": "UFRAME 7",
         "in": "flange of left",
         "numbers": {"X": "0.000", "Y": "-120.000", "Z": "45.000", "W": "180.000", "P": "0.000", "R": "-90.000"},

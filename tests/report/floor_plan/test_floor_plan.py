@@ -182,6 +182,8 @@ def test_frames_to_type_make_the_sheet_longer_and_leave_the_plan_as_it_is(plan: 
         ends = [float(entry.get("y")) for entry in ET.fromstring(text).iter(f"{NS}text")]  # noqa: S314 - our own text
         assert 2100.0 < max(ends) < height - 80.0
     assert heights[2] > 4200.0
+    rows = {entry.text for entry in ET.fromstring(few).iter(f"{NS}text")}  # noqa: S314 - our own text
+    assert f"  UFRAME 1 in base  X 1.000  {'seam & more' * 20}"[:190] in rows  # the end of a long line is left out
     gone = set(plain.splitlines()[8:]) - set(few.splitlines())
     assert sorted(line.partition(" class=")[0] for line in gone) == ["<rect", "<text"]  # the paper, and what it is
 
