@@ -32,12 +32,18 @@ def with_overrides(cell: Cell, settings: Iterable[str] = (), **options: str | fl
     Raises:
         InputError: An address does not exist or is given twice, or the changed cell is not valid.
     """
-    values: dict[str, object] = {ADDRESSES[name]: value for name, value in options.items() if value is not None}
+    values = read_settings(settings, {ADDRESSES[name]: value for name, value in options.items() if value is not None})
+    return cell.with_values(values) if values else cell
+
+
+def read_settings(settings: Iterable[str], others: Mapping[str, object] | None = None) -> dict[str, object]:
+    """Values by address of ``KEY=VALUE``, beside others; raises ``InputError`` where an address is given twice."""
+    values = dict(others or {})
     for address, value in map(read_setting, settings):
         if address in values:
             raise InputError(f"--set: expected every key once, got '{address}' again")
         values[address] = value
-    return cell.with_values(values) if values else cell
+    return values
 
 
 def with_draws(errors: "CellErrors", *, trials: int | None = None, seed: int | None = None) -> "CellErrors":

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from cellplan.cli.options.request import Options, option
-from cellplan.cli.options.shared import AllowDirs, AsJson, CellFile, Quiet
+from cellplan.cli.options.shared import AllowDirs, AsJson, CellFile, Quiet, Settings
 from cellplan.cli.terminal.output import Result
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -21,6 +21,7 @@ class AssignOptions(Options):
     output: Annotated[
         Path | None, option("-o, --output DIR", "Folder (default: outputs/NAME-assign, NAME that of the cell).")
     ] = None
+    settings: Settings = ()
     effort: Annotated[int, option("--effort N", "Work of the solver: 1 quick, 2 usual, 5 very long.", min=1, max=5)] = 2
     stations: Annotated[
         int | None,
@@ -50,7 +51,7 @@ def assign(options: AssignOptions) -> Result:
     from cellplan.jobs.assign.result import assign_lines, bound_lines, bound_record, write_assignment, write_bound
     from cellplan.jobs.view.write import write_view_of_run
 
-    draft = AssignmentDraft.load(options.cell, allow_dirs=options.allow_dirs)
+    draft = AssignmentDraft.load(options.cell, allow_dirs=options.allow_dirs, settings=options.settings)
     folder = options.output or Path("outputs") / f"{draft.cell.name}-assign"
     refuse_unless_replaceable(folder)
     with progress_listener(quiet=options.quiet) as progress:

@@ -115,12 +115,15 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
     return _read(CellFile(document=document, name=path.name, folder=folder or path.parent, allow_dirs=allowed))
 
 
-def load_open_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> tuple[Cell, dict[str, tuple[str, ...]]]:
+def load_open_cell(
+    path: Path | str, *, allow_dirs: Sequence[Path] = (), values: Mapping[str, object] | None = None
+) -> tuple[Cell, dict[str, tuple[str, ...]]]:
     """Read a cell in which tasks may be open to several robots, for a search that chooses one of them.
 
     Args:
         path: The cell file.
         allow_dirs: As for ``load_cell``.
+        values: Values in place of those of the file, by address; see ``Cell.with_values``.
 
     Returns:
         The cell with the first robot of each open task, and all robots of each by the name of the task.
@@ -130,10 +133,16 @@ def load_open_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> tupl
         InputError: The cell file cannot be read at all.
     """
     path = Path(path)
-    document = read_yaml(path, file=str(path))
-    allowed, first = tuple(Path(folder) for folder in allow_dirs), with_first_robots(document)
+    document = changed(read_yaml(path, file=str(path)), values or {})
     robots = open_tasks(document.root)
-    source = CellFile(document=first, name=path.name, folder=path.parent, allow_dirs=allowed, robots=robots)
+    source = CellFile(
+        document=with_first_robots(document),
+        changes=plain_values(values or {}),
+        name=path.name,
+        folder=path.parent,
+        allow_dirs=tuple(Path(folder) for folder in allow_dirs),
+        robots=robots,
+    )
     return _read(source, unknown_robot_findings(document)), robots
 
 

@@ -50,11 +50,15 @@ def with_first_robots(document: YamlDocument) -> YamlDocument:
 
 
 def open_task_findings(document: YamlDocument) -> Iterator[Finding]:
-    """Refuse open tasks."""
+    """Refuse open tasks, those with the same robots in one line."""
+    alike: dict[tuple[str, str], list[str]] = {}
     for name in open_tasks(document.root):
         value = document.root["tasks"][name]["robot"]
         kind = "a robot" if isinstance(value, tuple) or value == ANY else "an available robot"
-        words = f"expected the name of {kind}, got {shown(value)}: cellplan assign chooses who does an open task"
+        alike.setdefault((kind, shown(value)), []).append(name)
+    for (kind, value), (name, *others) in alike.items():
+        more = f", as in {len(others)} more task{'s' * (len(others) > 1)}" if others else ""
+        words = f"expected the name of {kind}, got {value}{more}: cellplan assign chooses who does an open task"
         yield document.finding(("tasks", name, "robot"), words)
 
 

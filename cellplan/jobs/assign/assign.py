@@ -108,13 +108,7 @@ class AssignmentBound:
 def assignment_bound(
     draft: AssignmentDraft, *, effort: int = 2, stations: int | None = None, progress: Progress = silent
 ) -> AssignmentBound:
-    """The lower bound of a draft, with no program.
-
-    Args:
-        draft: The cell with open tasks.
-        effort: Work of the block model, from 1 to 5.
-        stations: Number of poses of the part in use at most; that of the draft when None.
-        progress: Called with the stage and the fraction done.
+    """The lower bound of a draft, with no program; the arguments are those of ``assign``.
 
     Raises:
         InputError: Something in the cell cannot be assigned.

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.files.cell.load import load_open_cell
+from cellplan.files.cell.changes import changed
+from cellplan.files.cell.load import CellFile, load_open_cell
 from cellplan.files.cell.open_tasks import open_tasks
 from cellplan.files.yaml.reader import read_yaml
 from cellplan.geometry.arrays import Array
@@ -17,6 +18,7 @@ from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Mode, Robot, Timing
 from cellplan.model.robot.robot import configuration_in_si, start_keys
 from cellplan.model.settings.assign import POSTURE_LIMIT, AssignEntry
+from cellplan.runs.overrides import read_settings
 from cellplan.runs.plan.program_faults import refuse_crowded_homes, refuse_touching_configurations
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.problem.goals import Stations, task_goals
@@ -42,14 +44,21 @@ class AssignmentDraft:
     file: Path
 
     @classmethod
-    def load(cls, file: Path | str, *, allow_dirs: Sequence[Path] = ()) -> "AssignmentDraft":
+    def load(
+        cls, file: Path | str, *, allow_dirs: Sequence[Path] = (), settings: Sequence[str] = ()
+    ) -> "AssignmentDraft":
         """Read a cell file.
+
+        Args:
+            file: The file.
+            allow_dirs: Further folders that the files it names may lie in.
+            settings: Values in place of those of the file, as ``KEY=VALUE``.
 
         Raises:
             InputError: The file cannot be read, or an assignment is not made for such cells; one located line each.
             HomeNotFoundError: Robots are too close to each other at their homes.
         """
-        cell, robots = load_open_cell(file, allow_dirs=allow_dirs)
+        cell, robots = load_open_cell(file, allow_dirs=allow_dirs, values=read_settings(settings))
         refuse_unless_assignable(cell)
         for task in cell.tasks:
             if task.name in robots and task.start_posture is not None:
@@ -89,7 +98,8 @@ class AssignmentDraft:
 
     def with_robot(self, name: str) -> "AssignmentDraft":
         """The draft if a robot were available: its tasks are its alone, and open ones are open to it too."""
-        root = read_yaml(self.file, file=str(self.file)).root
+        changes = self.cell.origin.source.changes if isinstance(self.cell.origin.source, CellFile) else {}
+        root = changed(read_yaml(self.file, file=str(self.file)), changes).root
         robot = {**root["robots"][name], "available": True}
         opened = open_tasks({**root, "robots": {**root["robots"], name: robot}})
         robots = {task: opened.get(task, (name,)) for task in self.robots}

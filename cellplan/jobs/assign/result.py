@@ -25,6 +25,7 @@ from cellplan.runs.solve import with_verdict
 from cellplan.runs.write_run import versions, write_run
 from cellplan.search.assign.problem.instance import Instance
 from cellplan.search.assign.schedules.order import SequencedBlocks
+from cellplan.search.assign.schedules.solver import solver_version
 
 SCHEMA: Final = "cellplan.assignment/1"
 BOUND_SCHEMA: Final = "cellplan.assignment-bound/1"
@@ -77,7 +78,7 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
         "counts": dict(assignment.counts),
         "failed": failed,
         "inputs": dict(assignment.draft.inputs),
-        "versions": versions(),
+        "versions": versions() | solver_version(),
     }
 
 
@@ -96,7 +97,7 @@ def bound_record(bound: AssignmentBound) -> dict[str, Any]:
         "only_one_robot": _only_one_robot(instance),
         "counts": dict(bound.counts),
         "inputs": dict(bound.draft.inputs),
-        "versions": versions(),
+        "versions": versions() | solver_version(),
     }
 
 
@@ -180,13 +181,18 @@ def _waits(robots: Sequence[str], blocks: Sequence[Record]) -> dict[str, dict[st
 
 
 def _alternative(assignment: Assignment, other: SequencedBlocks) -> dict[str, Any]:
-    """Another schedule: its figures, and the tasks that another robot does in it."""
-    chosen = assignment.sequenced.schedule.chosen
+    """Another schedule: its figures, and what is different in it: robots, else blocks, else poses of the part."""
+    best = assignment.sequenced.schedule
+    others = {task: robot for task, (robot, _) in other.schedule.chosen.items() if robot != best.chosen[task][0]}
+    blocks = set(map(frozenset, best.blocks))
+    words = [f"{task} by {robot}" for task, robot in others.items()]
+    words = words or [" with ".join(block) for block in other.schedule.blocks if frozenset(block) not in blocks]
     return {
         "model_cycle_s": number(other.steps * assignment.instance.step),
         "blocks": [list(block) for block in other.schedule.blocks],
         "stations": len({station for station, _ in other.stops}),
-        "other_robots": {task: robot for task, (robot, _) in other.schedule.chosen.items() if robot != chosen[task][0]},
+        "other_robots": others,
+        "words": ", ".join(words) or "other poses of the part",
     }
 
 
@@ -256,7 +262,7 @@ def assign_lines(record: Record) -> list[str]:
         if block["cleaned_before"]:
             words += f"; before it the tools of {', '.join(block['cleaned_before'])} are cleaned"
         lines.append(f"  {block['phase']} {block['begin_s']:g} to {block['end_s']:g} s: {tasks}{words}")
-    lines += [f"  nearly as good: {_alternative_words(other)}" for other in record["alternatives"]]
+    lines += dict.fromkeys(f"  nearly as good: {_alternative_words(other)}" for other in record["alternatives"])
     lines += [f"  LEFT OUT {message}" for message in record["left_out"]]
     return [*lines, *(f"  FAILED {message}" for message in record["failed"])]
 
@@ -268,9 +274,8 @@ def _wait_words(waits: Record) -> str:
 
 def _alternative_words(other: Record) -> str:
     """A schedule that is nearly as good."""
-    robots = ", ".join(f"{task} by {robot}" for task, robot in other["other_robots"].items())
     figures = f"{other['model_cycle_s']:g} s by the model in {len(other['blocks'])} blocks, {other['stations']} poses"
-    return f"{figures}; {robots or 'the same robots'}"
+    return f"{figures}; {other['words']}"
 
 
 def _part_words(record: Record) -> str:

@@ -10,7 +10,7 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.files.cell.load import load_cell, load_open_cell
 from cellplan.jobs.assign.assign import Assignment, assign
 from cellplan.jobs.assign.draft import AssignmentDraft
-from cellplan.jobs.assign.result import assign_record, write_assignment
+from cellplan.jobs.assign.result import assign_lines, assign_record, write_assignment
 from cellplan.runs.solve import solve
 from cellplan.runs.write_run import write_run
 from cellplan.search.assign.schedules.schedule import refuse_impossible
@@ -76,6 +76,8 @@ def test_alternatives_are_other_schedules_that_take_little_longer(assignment: As
         assert (assignment.bound or 0.0) <= other.steps * assignment.instance.step <= 1.05 * assignment.model_cycle
     chosen = {(frozenset(map(frozenset, it.blocks)), frozenset(it.chosen.items())) for it in schedules}
     assert len(chosen) == len(schedules) > 1
+    lines = [it for it in assign_lines(assign_record(assignment)) if "nearly as good" in it]
+    assert len(set(lines)) == len(lines) > 1
 
 
 def test_what_a_task_states_is_kept(assignment: Assignment, tmp_path: Path) -> None:

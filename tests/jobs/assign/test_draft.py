@@ -65,6 +65,19 @@ def test_cells_of_which_no_assignment_is_made(tmp_path: Path, old: str, new: str
     assert words in str(refused.value)
 
 
+def test_values_of_the_command_line_come_before_tasks_are_read_as_open(tmp_path: Path) -> None:
+    settings = ("tasks.top_1.robot=east", "tasks.top_2.robot=any", "robots.west.available=false")
+
+    changed = AssignmentDraft.load(OPEN, settings=settings)
+
+    assert changed.absent == ("west",)
+    assert set(changed.robots.values()) == {("east",)}
+    assert set(changed.robots) == {task.name for task in changed.cell.tasks} - {"top_1"}
+    assert changed.with_robot("west").robots["top_2"] == ("west", "east")
+    with pytest.raises(InputError, match=r"--set: expected KEY=VALUE"):
+        AssignmentDraft.load(OPEN, settings=("x",))
+
+
 def test_homes_at_which_robots_touch_are_refused_before_anything_is_searched(tmp_path: Path) -> None:
     with pytest.raises(HomeNotFoundError, match=r"robots\.west\.home_deg: the homes come too close: .* touches"):
         draft(tmp_path, (HOME, HOME.replace("0, -40, 60, 0, 60, 0", "0, -60, 90, 0, 60, 0")))

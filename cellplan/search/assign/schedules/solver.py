@@ -1,6 +1,8 @@
 """The one door to OR-Tools, the extra ``assign``: models of truth values that end by counts, not by the clock."""
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any, Final
 
@@ -12,6 +14,11 @@ ROUNDING: Final = 1e-6  # [steps] of a bound
 def is_installed() -> bool:
     """Whether the solver can be used."""
     return find_spec("ortools") is not None
+
+
+def solver_version() -> dict[str, str]:
+    """Version of the solver by the name of its package; none where it cannot be used."""
+    return {"ortools": version("ortools")} if is_installed() else {}
 
 
 def new_model() -> Any:
@@ -45,7 +52,14 @@ class Solved:
         parameters.num_workers, parameters.interleave_search, parameters.random_seed = WORKERS, True, 1
         parameters.max_deterministic_time = effort
         parameters.fill_additional_solutions_in_response, parameters.solution_pool_size = True, POOL
-        status = self._solver.solve(model)
+        parameters.catch_sigint_signal = False  # the solver would stop early and the command go on
+        with ThreadPoolExecutor(1) as thread:
+            solving = thread.submit(self._solver.solve, model)
+            try:
+                status = solving.result()
+            except KeyboardInterrupt:
+                self._solver.stop_search()
+                raise
         response = self._solver.response_proto
         pool = dict.fromkeys(tuple(it.values) for it in response.additional_solutions)
         best = tuple(response.solution)
