@@ -1,7 +1,7 @@
 """The one door to OR-Tools, the extra ``assign``: models of truth values that end by counts, not by the clock."""
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any, Final
@@ -9,6 +9,7 @@ from typing import Any, Final
 WORKERS: Final = 8  # searches that take turns; their number decides the answer, not the number of processors
 POOL: Final = 24  # answers that are known at the end
 ROUNDING: Final = 1e-6  # [steps] of a bound
+LISTENING: Final = 0.5  # [s] from one look for the end of a search to the next; it ends no search
 
 
 def is_installed() -> bool:
@@ -56,11 +57,12 @@ class Solved:
         with ThreadPoolExecutor(1) as thread:
             solving = thread.submit(self._solver.solve, model)
             try:
-                status = solving.result()
+                while not wait([solving], timeout=LISTENING).done:
+                    pass
             except KeyboardInterrupt:
                 self._solver.stop_search()
                 raise
-        response = self._solver.response_proto
+        status, response = solving.result(timeout=LISTENING), self._solver.response_proto
         pool = dict.fromkeys(tuple(it.values) for it in response.additional_solutions)
         best = tuple(response.solution)
         self.answers = [best, *(it for it in pool if it != best)] if best else []
