@@ -18,15 +18,12 @@ ROWS_AT_ONCE: Final = 10_000  # pairs whose bounds are copied at once: 16 MB
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PairBound:
-    """What is known of one pair over a motion; times are counted in samples, with fractions between them.
-
-    Attributes:
-        low: No distance is below this in a block of the motion, in [m], shape (K,); zero where the bodies touch; inf
-            where all of a tool lies inside its contact zone. Negative where nothing is proved.
-    """
+    """What is known of one pair over a motion; times are counted in samples, with fractions between them."""
 
     row: int  # index of the pair in ``Scene.pairs``
     pair: ScenePair
+    # no distance is below this in a block of the motion, in [m], shape (K,); zero where the bodies touch; inf where all
+    # of a tool lies inside its contact zone. Negative where nothing is proved.
     low: Array
     lowest: float  # smallest one of them
     distance: float  # smallest distance measured in [m], never above the truth; inf where none was

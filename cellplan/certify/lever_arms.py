@@ -28,14 +28,11 @@ from cellplan.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """The joints between two bodies, the nearest to the first one first.
-
-    Attributes:
-        levers: Lever arm of each to the points of the second body, in [m] for joints that turn, 1 for those that
-            slide, shape (m,).
-    """
+    """The joints between two bodies, the nearest to the first one first."""
 
     axes: np.ndarray  # their places among all axes of the scene, shape (m,)
+    # lever arm of each to the points of the second body, in [m] for joints that turn, 1 for those that slide, shape
+    # (m,)
     levers: Array
     turns: Array  # 1 for joints that turn, 0 for those that slide, shape (m,)
 

@@ -14,18 +14,15 @@ from cellplan.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StraightMotion:
-    """A stretch of a program; see ``collision.continuous.motion_bound.Motion``.
-
-    Attributes:
-        bend: Largest second derivative of any point of an engine's body in each step, seen from the world, with the
-            step as the unit of time, in [m], shape (n - 1,), by the body.
-    """
+    """A stretch of a program; see ``collision.continuous.motion_bound.Motion``."""
 
     scene: Scene
     arms: LeverArms  # the lever arms of the whole program
     q: Array  # stacked joint positions in [rad] or [m], shape (n, nq)
     steps: Array  # by how much each axis moves in each step, without its sign, in [rad] or [m], shape (n - 1, axes)
     poses: BodyPoses  # where the bodies are at the samples
+    # largest second derivative of any point of an engine's body in each step, seen from the world, with the step as the
+    # unit of time, in [m], shape (n - 1,), by the body
     bend: Mapping[int, Array]
     centres: Mapping[int, Array]  # centres of the bounding spheres in the world in [m], shape (n, 3), by the body
 

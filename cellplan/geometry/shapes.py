@@ -46,21 +46,15 @@ class Sphere:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """Triangle mesh; the vertices need not be centred.
+    """Triangle mesh; the vertices need not be centred."""
 
-    Attributes:
-        vertices: Corner points in [m], shape (V, 3).
-        faces: Corner indices of each triangle, counter-clockwise from outside, shape (M, 3).
-        source: File name for messages.
-        is_closed: Whether the surface encloses a volume: it is that of a solid, or of several that share edges.
-        is_leaky: Whether it stands for a solid although it is not closed, as meshes of links often do: what its
-            triangles wind round by more than one half, either way, counts as inside.
-    """
-
-    vertices: Array
+    vertices: Array  # corner points in [m], shape (V, 3)
+    # corner indices of each triangle, counter-clockwise from outside, shape (M, 3)
     faces: np.ndarray[tuple[int, int], np.dtype[np.int64]]
-    source: str
-    is_closed: bool
+    source: str  # file name for messages
+    is_closed: bool  # whether the surface encloses a volume: it is that of a solid, or of several that share edges
+    # whether it stands for a solid although it is not closed, as meshes of links often do: what its triangles wind
+    # round by more than one half, either way, counts as inside
     is_leaky: bool = False
 
 

@@ -21,22 +21,18 @@ class CellSource(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """The document of a cell: source lines for located errors, and what is needed to write or to change it.
+    """The document of a cell: source lines for located errors, and what is needed to write or to change it."""
 
-    Attributes:
-        file: File name as the user gave it.
-        lines: Line number, from 1, of each key path (``robots.kuka.start_deg``) that the file gives.
-        document: The file as plain values in the file's units, every default filled in: what a written copy is made of.
-        changes: Values set by ``Cell.with_values``, by address, in the order in which they were set.
-        changed: What to print for each changed key path: ``motion.duration_s = 2.5``.
-        source: Reads the document again with other values; None for a cell that was built in Python.
-    """
-
-    file: str = "<cell>"
+    file: str = "<cell>"  # file name as the user gave it
+    # line number, from 1, of each key path (``robots.kuka.start_deg``) that the file gives
     lines: Mapping[str, int] = field(default_factory=dict)
+    # the file as plain values in the file's units, every default filled in: what a written copy is made of
     document: Mapping[str, object] = field(default_factory=dict)
+    # values set by ``Cell.with_values``, by address, in the order in which they were set
     changes: Mapping[str, object] = field(default_factory=dict)
+    # what to print for each changed key path: ``motion.duration_s = 2.5``
     changed: Mapping[str, str] = field(default_factory=dict)
+    # reads the document again with other values; None for a cell that was built in Python
     source: CellSource | None = None
 
     def at(self, key: str) -> str:

@@ -20,18 +20,15 @@ MethodName = Literal[  # each is the name of a file and a function in planning/m
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MethodTraits:
-    """What a resolution method is and can do.
-
-    Attributes:
-        feeds_back: Whether the pose error is fed back with the gain of the solver; searches minimise it directly.
-        steps_because: Why the motion can only be stepped along the clock, as a predicate of the method; empty where it
-            can also be resolved by collocation (the integrator ``accurate``).
-    """
+    """What a resolution method is and can do."""
 
     label: str  # name in reports
     has_null_space: bool = True  # whether goals besides the tasks can be pursued in the null space of the task Jacobian
+    # whether the pose error is fed back with the gain of the solver; searches minimise it directly
     feeds_back: bool = True
     takes_euler_steps: bool = False  # whether a joint step is a joint velocity times the time step
+    # why the motion can only be stepped along the clock, as a predicate of the method; empty where it can also be
+    # resolved by collocation (the integrator ``accurate``)
     steps_because: str = ""
 
     @property

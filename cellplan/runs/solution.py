@@ -15,27 +15,17 @@ from cellplan.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Run:
-    """One phase of the program and its proof, on the phase's own time, which starts at 0.
+    """One phase of the program and its proof, on the phase's own time, which starts at 0."""
 
-    Attributes:
-        phase: The phase on the clock of the program.
-        schedule: Desired tool poses.
-        motion: Joint positions of all robots, as they were planned.
-        program: The program as text, in which this phase has its rows.
-        report: Result of the checks on these rows.
-        scene: The scene that it is judged in, with the cell as it is in this phase.
-        rungs: How the transfer move of each robot was found, by robot; empty without transfer moves.
-        moved: How far its starts were moved.
-    """
-
-    phase: Phase
-    schedule: Schedule
-    motion: Motion
-    program: Program
-    report: Report
-    scene: Scene
+    phase: Phase  # the phase on the clock of the program
+    schedule: Schedule  # desired tool poses
+    motion: Motion  # joint positions of all robots, as they were planned
+    program: Program  # the program as text, in which this phase has its rows
+    report: Report  # result of the checks on these rows
+    scene: Scene  # the scene that it is judged in, with the cell as it is in this phase
+    # how the transfer move of each robot was found, by robot; empty without transfer moves
     rungs: Mapping[str, str] = field(default_factory=dict)
-    moved: tuple[MovedStart, ...] = ()
+    moved: tuple[MovedStart, ...] = ()  # how far its starts were moved
 
     def __repr__(self) -> str:
         """One line without arrays."""

@@ -30,21 +30,18 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SceneBody:
-    """One solid of the cell.
+    """One solid of the cell."""
 
-    Attributes:
-        name: ``<robot>/<body>``, ``<robot>/tool``, ``<robot>/pedestal``, ``<robot>/mount`` or ``<robot>/<attachment>``,
-            ``part`` or the name of a thing in the surroundings.
-        accuracy: How far the real thing may stick out of it in [m]; None when it is not stated. What the user draws
-            (tools, part, attachments, pedestals, surroundings) is taken as exact.
-    """
-
+    # ``<robot>/<body>``, ``<robot>/tool``, ``<robot>/pedestal``, ``<robot>/mount`` or ``<robot>/<attachment>``,
+    # ``part`` or the name of a thing in the surroundings
     name: str
     kind: Kind  # what it belongs to
     shape: Shape  # the solid, in its own frame S
     robot: str | None  # the robot that moves it; None when it is fixed in the world
     link: int  # the link of that robot it is fixed to
     X_BS: Array  # its pose at the reference configuration in the robot's base frame, or in the world
+    # how far the real thing may stick out of it in [m]; None when it is not stated. What the user draws (tools, part,
+    # attachments, pedestals, surroundings) is taken as exact.
     accuracy: float | None = 0.0
 
     @property

@@ -39,20 +39,16 @@ class WatchedPairs:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NearPairs:
-    """Pairs that come nearer than a distance at some configurations; M of them, ordered by configuration and pair.
-
-    Attributes:
-        distances: Signed distances in [m], negative where the bodies overlap by so much, shape (M,). Of bodies that are
-            not convex it is that of their hulls, never more than the true one, where that keeps what is demanded of the
-            pair or the surfaces touch; that of their surfaces otherwise. Of a tool that is cut off before its tip it is
-            that of its hull.
-        normals: Unit directions from the first body to the second in W: the distance grows when the second moves along
-            them, shape (M, 3).
-    """
+    """Pairs that come nearer than a distance at some configurations; M of them, ordered by configuration and pair."""
 
     rows: Indices  # their places in ``Scene.pairs``, or in the pairs of a table of its own, shape (M,)
     samples: Indices  # at which configuration, shape (M,)
+    # signed distances in [m], negative where the bodies overlap by so much, shape (M,). Of bodies that are not convex
+    # it is that of their hulls, never more than the true one, where that keeps what is demanded of the pair or the
+    # surfaces touch; that of their surfaces otherwise. Of a tool that is cut off before its tip it is that of its hull.
     distances: Array
+    # unit directions from the first body to the second in W: the distance grows when the second moves along them, shape
+    # (M, 3)
     normals: Array
     first: Array  # points of the first bodies that are so far from the second ones, in W in [m], shape (M, 3)
     second: Array  # points of the second bodies likewise, shape (M, 3)

@@ -33,15 +33,12 @@ class Rule(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScenePair:
-    """Two bodies that are watched.
-
-    Attributes:
-        solids: The engine's bodies that must not touch: the two bodies themselves, or what lies outside a contact zone
-            and the part. None for a half-space, and where all of a tool lies inside its zone.
-    """
+    """Two bodies that are watched."""
 
     first: int  # index of the one body of the scene
     second: int  # index of the other; a half-space is always the second
+    # the engine's bodies that must not touch: the two bodies themselves, or what lies outside a contact zone and the
+    # part. None for a half-space, and where all of a tool lies inside its zone.
     solids: tuple[int, int] | None
     is_ground: bool  # whether the second body is a half-space
     clearance_class: ClearanceClass  # classes of pairs of bodies

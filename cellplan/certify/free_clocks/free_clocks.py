@@ -34,32 +34,26 @@ CORNERS: Final = np.array([1.0, -1.0, 1.0, -1.0])  # the smallest of these multi
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ClockRegion:
-    """Places of the programs of two robots that may meet.
-
-    Attributes:
-        rectangles: Rows of the first robot from a0 to a1 with those of the second from b0 to b1, as (a0, a1, b0, b1),
-            fractions between rows allowed, shape (R, 4).
-    """
+    """Places of the programs of two robots that may meet."""
 
     first: str  # the one robot
     second: str  # the other one
+    # rows of the first robot from a0 to a1 with those of the second from b0 to b1, as (a0, a1, b0, b1), fractions
+    # between rows allowed, shape (R, 4)
     rectangles: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RegionBound:
-    """What is proved of all pairs of bodies of two robots in a region.
-
-    Attributes:
-        bodies: The pair that does not keep what is demanded of it, or of which too little is proved, or else the
-            nearest; None when none is known.
-        distance: Smallest distance measured in [m], that of these two, never above the truth; zero where they touch;
-            inf where none was measured.
-    """
+    """What is proved of all pairs of bodies of two robots in a region."""
 
     first: str  # the one robot
     second: str  # the other one
+    # the pair that does not keep what is demanded of it, or of which too little is proved, or else the nearest; None
+    # when none is known
     bodies: tuple[str, str] | None
+    # smallest distance measured in [m], that of these two, never above the truth; zero where they touch; inf where none
+    # was measured
     distance: float
     proved: float  # distance in [m] that all pairs with the rule ``clearance`` keep for certain; inf without such pairs
     at: tuple[float, float] | None  # row of the first robot and of the second where they are; None for none

@@ -43,17 +43,14 @@ ROTATIONS: Final = (3, 4, 5)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _MeasuredTool:
-    """A tool that is to be somewhere relative to the part, or to the world.
-
-    Attributes:
-        off: By how much it may be off besides at the rows in [m] and [rad], shape (N, 2); None for nothing.
-    """
+    """A tool that is to be somewhere relative to the part, or to the world."""
 
     relation: Relation  # the task or the grasp
     at_rows: Array  # position error in [m] and orientation error in [rad] at the rows, shape (N, 2)
     allowed: tuple[float, float]  # largest errors allowed between the rows
     place: int | None  # place of its task among those of the schedule; None for a grasp
     first: int  # first row from which on it is judged
+    # by how much it may be off besides at the rows in [m] and [rad], shape (N, 2); None for nothing
     off: Array | None = None
 
     def more(self, k: Indices, s: Array) -> Array:

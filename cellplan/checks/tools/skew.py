@@ -111,14 +111,11 @@ class ToolTravel:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Mover:
-    """A robot over the rows of a program.
-
-    Attributes:
-        bend: Largest second derivative of its tool tip in each step in [m], shape (N - 1,); see ``lever_arms.Chain``.
-    """
+    """A robot over the rows of a program."""
 
     chain: ScrewChain  # its kinematics
     q: Array  # its positions in [rad] or [m], shape (N, n)
+    # largest second derivative of its tool tip in each step in [m], shape (N - 1,); see ``lever_arms.Chain``
     bend: Array
     turn_bend: Array  # likewise of a unit vector that turns with the tool
 

@@ -22,17 +22,11 @@ PARAMETER_TOL: Final = 1e-13  # [-] of a panel from -1 to 1: a Newton step as sm
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ArcLength:
-    """Length along a curve as one polynomial per panel.
+    """Length along a curve as one polynomial per panel."""
 
-    Attributes:
-        edges: Parameters between the panels, shape (K + 1,); every knot of the curve is one.
-        behind: Length in [m] behind each edge, shape (K + 1,).
-        series: Legendre coefficients of the length from a panel's start, over -1..1, shape (K, NODE_COUNT + 1).
-    """
-
-    edges: Array
-    behind: Array
-    series: Array
+    edges: Array  # parameters between the panels, shape (K + 1,); every knot of the curve is one
+    behind: Array  # length in [m] behind each edge, shape (K + 1,)
+    series: Array  # Legendre coefficients of the length from a panel's start, over -1..1, shape (K, NODE_COUNT + 1)
 
     @property
     def total(self) -> float:
@@ -69,14 +63,11 @@ class QuickParameters:
     """The inverse of a length for a few points at a time: a tenth of the calls that `ArcLength.parameters` makes.
 
     With ``x = cos(a)`` all Chebyshev polynomials are one array, ``cos(k a)``, from which length and speed follow.
-
-    Attributes:
-        arc: The length.
-        series: Chebyshev coefficients of the length from a panel's start and of its derivative, over -1..1, shape
-            (K, NODE_COUNT + 1, 2).
     """
 
-    arc: ArcLength
+    arc: ArcLength  # the length
+    # Chebyshev coefficients of the length from a panel's start and of its derivative, over -1..1, shape (K, NODE_COUNT
+    # + 1, 2)
     series: Array
 
     def parameters(self, length: Array, interval: Interval) -> Array:

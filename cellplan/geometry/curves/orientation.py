@@ -112,16 +112,11 @@ class RotationCurve:
 
     .. math:: R(x) = R_k \exp(b_1 v_1) \exp(b_2 v_2) \exp(b_3 v_3),
               \quad b_1 = 1 - (1 - x)^3, \; b_2 = 3 x^2 - 2 x^3, \; b_3 = x^3
-
-    Attributes:
-        knots: Increasing parameters, shape (M + 1,).
-        starts: Orientation at the start of each span, shape (M, 3, 3).
-        factors: Rotation vectors v1, v2, v3 of each span in [rad], shape (M, 3, 3), in the tool frame.
     """
 
-    knots: Array
-    starts: Array
-    factors: Array
+    knots: Array  # increasing parameters, shape (M + 1,)
+    starts: Array  # orientation at the start of each span, shape (M, 3, 3)
+    factors: Array  # rotation vectors v1, v2, v3 of each span in [rad], shape (M, 3, 3), in the tool frame
 
     def frames(self, u: Array, interval: Interval, *, p: Array, dp: Array) -> tuple[Array, Array]:  # noqa: ARG002
         """Tool frames and their turning rate, see `Orientation`."""

@@ -24,13 +24,10 @@ _ROUNDED: Final = 9  # decimals of dimensions in [m]
 
 @dataclass(slots=True)
 class Geometries:
-    """The shapes of a page in the order in which they were first used.
-
-    Attributes:
-        visuals: What the file of each robot draws, by its name; read when it is first asked for.
-    """
+    """The shapes of a page in the order in which they were first used."""
 
     records: list[Record] = field(default_factory=list)  # the shapes
+    # what the file of each robot draws, by its name; read when it is first asked for
     visuals: dict[str, tuple[Visual, ...]] = field(default_factory=dict)
     weights: dict[Hashable, int] = field(default_factory=dict)  # triangles of each mesh in its file, by its key
     _places: dict[Hashable, int] = field(default_factory=dict)

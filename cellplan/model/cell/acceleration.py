@@ -25,17 +25,13 @@ class AccelerationRule:
     """Against which accelerations the joints of one robot are judged.
 
     A stated limit of a joint always counts, unless accelerations are not judged at all.
-
-    Attributes:
-        full_speed_in: For joints without a stated limit, the seconds in which they are taken to reach their top speed,
-            in the order of the joints; the last one counts for all further joints. Empty: nothing is assumed.
-        is_unlimited: Whether neither accelerations nor jerk are judged.
-        reason: Why they are not; empty where none is given.
     """
 
+    # for joints without a stated limit, the seconds in which they are taken to reach their top speed, in the order of
+    # the joints; the last one counts for all further joints. Empty: nothing is assumed.
     full_speed_in: tuple[float, ...] = USUAL_FULL_SPEED_IN
-    is_unlimited: bool = False
-    reason: str = ""
+    is_unlimited: bool = False  # whether neither accelerations nor jerk are judged
+    reason: str = ""  # why they are not; empty where none is given
 
 
 USUAL_ACCELERATION: Final = AccelerationRule()
@@ -43,35 +39,20 @@ USUAL_ACCELERATION: Final = AccelerationRule()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointAcceleration:
-    """The acceleration and jerk of one joint in [rad] or [m] and seconds.
+    """The acceleration and jerk of one joint in [rad] or [m] and seconds."""
 
-    Attributes:
-        robot: Name of the robot.
-        joint: Name of the joint.
-        is_revolute: Whether it turns rather than slides.
-        peak: Largest acceleration, the step out of rest and the one into rest included.
-        peak_at_s: Its instant.
-        limit: What is allowed; None where nothing is.
-        source: Where the limit comes from.
-        peak_jerk: Largest change of acceleration over ``window``, divided by it.
-        peak_jerk_at_s: Its instant.
-        jerk_limit: What is allowed; None where nothing is stated or nothing is judged.
-        window: Time in [s] over which jerk is taken.
-        is_jump: Whether the peak is a jump of speed, out of rest or at a corner.
-    """
-
-    robot: str
-    joint: str
-    is_revolute: bool
-    peak: float
-    peak_at_s: float
-    limit: float | None
-    source: LimitSource
-    peak_jerk: float
-    peak_jerk_at_s: float
-    jerk_limit: float | None
-    window: float
-    is_jump: bool = False
+    robot: str  # name of the robot
+    joint: str  # name of the joint
+    is_revolute: bool  # whether it turns rather than slides
+    peak: float  # largest acceleration, the step out of rest and the one into rest included
+    peak_at_s: float  # its instant
+    limit: float | None  # what is allowed; None where nothing is
+    source: LimitSource  # where the limit comes from
+    peak_jerk: float  # largest change of acceleration over ``window``, divided by it
+    peak_jerk_at_s: float  # its instant
+    jerk_limit: float | None  # what is allowed; None where nothing is stated or nothing is judged
+    window: float  # time in [s] over which jerk is taken
+    is_jump: bool = False  # whether the peak is a jump of speed, out of rest or at a corner
 
     @property
     def ratio(self) -> float | None:
@@ -105,21 +86,13 @@ class PartAcceleration:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProcessSpeed:
-    """How fast a tool tip moves on the part, or in the world for a task that is given there, while its task runs.
+    """How fast a tool tip moves on the part, or in the world for a task that is given there, while its task runs."""
 
-    Attributes:
-        mean: Mean speed in [m/s] from the start of the path, once the tool has settled, to its end.
-        peak: Largest speed between two samples.
-        peak_at_s: Its instant.
-        steady_share: Share of that time, 0..1, in which the speed is within ``STEADY_FRACTION`` of the peak.
-        slower: Stretches of time in [s] in which it is lower, as (from, to).
-    """
-
-    mean: float
-    peak: float
-    peak_at_s: float
-    steady_share: float
-    slower: tuple[tuple[float, float], ...]
+    mean: float  # mean speed in [m/s] from the start of the path, once the tool has settled, to its end
+    peak: float  # largest speed between two samples
+    peak_at_s: float  # its instant
+    steady_share: float  # share of that time, 0..1, in which the speed is within ``STEADY_FRACTION`` of the peak
+    slower: tuple[tuple[float, float], ...]  # stretches of time in [s] in which it is lower, as (from, to)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,21 +106,14 @@ class NotJudged:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionAccelerations:
-    """All accelerations of a written motion; the robots stand still before its first row and after its last one.
+    """All accelerations of a written motion; the robots stand still before its first row and after its last one."""
 
-    Attributes:
-        joints: One entry per joint of every robot.
-        tools: The tool tip of each robot, by robot.
-        part: The part; None when no robot holds it.
-        process: Process speed by task; a task whose tool stands still has none.
-        not_judged: What was left out.
-    """
-
-    joints: tuple[JointAcceleration, ...] = ()
-    tools: Mapping[str, PointAcceleration] = field(default_factory=dict)
-    part: PartAcceleration | None = None
+    joints: tuple[JointAcceleration, ...] = ()  # one entry per joint of every robot
+    tools: Mapping[str, PointAcceleration] = field(default_factory=dict)  # the tool tip of each robot, by robot
+    part: PartAcceleration | None = None  # the part; None when no robot holds it
+    # process speed by task; a task whose tool stands still has none
     process: Mapping[str, ProcessSpeed] = field(default_factory=dict)
-    not_judged: tuple[NotJudged, ...] = ()
+    not_judged: tuple[NotJudged, ...] = ()  # what was left out
 
 
 UNKNOWN_ACCELERATIONS: Final = MotionAccelerations()

@@ -39,21 +39,13 @@ class Mode(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tool:
-    """A tool on a flange: its tip and its solids.
+    """A tool on a flange: its tip and its solids."""
 
-    Attributes:
-        X_FT: Tool tip in the flange frame, z out of the tool.
-        bodies: Solids, their poses ``X_BS`` given in F, ``link`` unused.
-        mass: Mass in [kg]; None when it is not stated.
-        centre: Centre of mass in F in [m], shape (3,); None to think of the mass at the tip.
-        rod: The rod that tip and first bodies follow from; None for a tool without one.
-    """
-
-    X_FT: Array
-    bodies: tuple[Body, ...]
-    mass: float | None = None
-    centre: Array | None = None
-    rod: Rod | None = None
+    X_FT: Array  # tool tip in the flange frame, z out of the tool
+    bodies: tuple[Body, ...]  # solids, their poses ``X_BS`` given in F, ``link`` unused
+    mass: float | None = None  # mass in [kg]; None when it is not stated
+    centre: Array | None = None  # centre of mass in F in [m], shape (3,); None to think of the mass at the tip
+    rod: Rod | None = None  # the rod that tip and first bodies follow from; None for a tool without one
 
     @property
     def is_bare(self) -> bool:
@@ -121,20 +113,14 @@ class Grasp:
 
     The first holder carries the part frame. The tool of each further one is tied to it: it has a pose on the part that
     never changes ([Ribeiro2010]_ 4.5).
-
-    Attributes:
-        robot: Name of the holder.
-        X_PT: The holder's tool tip in the part frame.
-        axes: Components of the tool's motion on the part that a further holder keeps at zero, in the order x, y, z,
-            rx, ry, rz.
-        depth: By how much in [m] what grips may reach into the part.
-        bodies: Names of the bodies that grip, as reports show them; None for all that is rigid with the flange.
     """
 
-    robot: str
-    X_PT: Array
+    robot: str  # name of the holder
+    X_PT: Array  # the holder's tool tip in the part frame
+    # components of the tool's motion on the part that a further holder keeps at zero, in the order x, y, z, rx, ry, rz
     axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
-    depth: float = 0.002
+    depth: float = 0.002  # by how much in [m] what grips may reach into the part
+    # names of the bodies that grip, as reports show them; None for all that is rigid with the flange
     bodies: tuple[str, ...] | None = None
 
     @property
@@ -215,31 +201,21 @@ class Timing(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionSettings:
-    """Mode and clock.
+    """Mode and clock."""
 
-    Attributes:
-        mode: Which robots move.
-        duration: Length of the common clock in [s]; None when it ends with the last task.
-        step: Time between two rows in [s]: that of the grid, where there is one.
-        cyclic: Whether all joints are to end where they started.
-        locked: Joints that fail during the motion.
-        timing: What times the motion along the path: the time laws, or the limits of the joints.
-        cycle: Time in [s] that each phase of a program takes; None unless the timing demands one.
-        build_up: Time in [s] in which a joint without a stated limit of jerk is taken to build up its acceleration
-            where a program is retimed; None for no limit.
-        grid: Grid of the controller in [s], on which all rows lie; None for rows of every step.
-        finer: Step in [s] of a method that goes from row to row, as ``step_s`` says; None where it is that of the rows.
-    """
-
-    mode: Mode
-    duration: float | None
-    step: float
-    cyclic: bool = False
-    locked: tuple[LockedJointEntry, ...] = ()
+    mode: Mode  # which robots move
+    duration: float | None  # length of the common clock in [s]; None when it ends with the last task
+    step: float  # time between two rows in [s]: that of the grid, where there is one
+    cyclic: bool = False  # whether all joints are to end where they started
+    locked: tuple[LockedJointEntry, ...] = ()  # joints that fail during the motion
+    # what times the motion along the path: the time laws, or the limits of the joints
     timing: Timing = Timing.AS_WRITTEN
-    cycle: float | None = None
+    cycle: float | None = None  # time in [s] that each phase of a program takes; None unless the timing demands one
+    # time in [s] in which a joint without a stated limit of jerk is taken to build up its acceleration where a program
+    # is retimed; None for no limit
     build_up: float | None = 0.05
-    grid: float | None = None
+    grid: float | None = None  # grid of the controller in [s], on which all rows lie; None for rows of every step
+    # step in [s] of a method that goes from row to row, as ``step_s`` says; None where it is that of the rows
     finer: float | None = None
 
 

@@ -16,25 +16,17 @@ SHORTEST_LINK: Final = 1e-9  # [m] axis points nearer than this give a link no d
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellErrors:
-    """Everything that is stated about a real cell.
+    """Everything that is stated about a real cell."""
 
-    Attributes:
-        robots: Errors by robot; robots that are not named are exact.
-        grasps: The real part seen from where it should be, by the robot that holds it.
-        measurement: Noise of the measuring system.
-        seed: Seed of all samples.
-        trials: Number of real cells that are drawn.
-        file: File name as the user gave it.
-        digest: SHA-256 of the file; empty when there is none.
-    """
-
+    # errors by robot; robots that are not named are exact
     robots: Mapping[str, RobotErrorsEntry] = field(default_factory=dict)
+    # the real part seen from where it should be, by the robot that holds it
     grasps: Mapping[str, PoseErrorEntry] = field(default_factory=dict)
-    measurement: MeasurementEntry = field(default_factory=MeasurementEntry)
-    seed: int = 0
-    trials: int = 1
-    file: str = "<errors>"
-    digest: str = ""
+    measurement: MeasurementEntry = field(default_factory=MeasurementEntry)  # noise of the measuring system
+    seed: int = 0  # seed of all samples
+    trials: int = 1  # number of real cells that are drawn
+    file: str = "<errors>"  # file name as the user gave it
+    digest: str = ""  # SHA-256 of the file; empty when there is none
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
@@ -54,19 +46,12 @@ class CellErrors:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotDraw:
-    """The errors of one robot in one trial.
+    """The errors of one robot in one trial."""
 
-    Attributes:
-        joint_offsets: In [rad] or [m], shape (n,).
-        link_lengths: Lengthening of the link before each joint in [m], shape (n,).
-        X_base: The real base seen from the written one, shape (4, 4).
-        X_tool: The real tool tip seen from the written one, shape (4, 4).
-    """
-
-    joint_offsets: Array
-    link_lengths: Array
-    X_base: Array
-    X_tool: Array
+    joint_offsets: Array  # in [rad] or [m], shape (n,)
+    link_lengths: Array  # lengthening of the link before each joint in [m], shape (n,)
+    X_base: Array  # the real base seen from the written one, shape (4, 4)
+    X_tool: Array  # the real tool tip seen from the written one, shape (4, 4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

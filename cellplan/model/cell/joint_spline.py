@@ -18,14 +18,10 @@ class JointSpline:
 
     The spline is clamped, with evenly spaced knots; its first and its last coefficient count three times, so that the
     joints begin and end at rest and without acceleration. The first coefficient is the start posture.
-
-    Attributes:
-        coefficients: Configurations in [rad] or [m], shape (M, n), at least two.
-        degree: Degree of the polynomials between two knots, 3 or 5.
     """
 
-    coefficients: Array
-    degree: int
+    coefficients: Array  # configurations in [rad] or [m], shape (M, n), at least two
+    degree: int  # degree of the polynomials between two knots, 3 or 5
 
     def __post_init__(self) -> None:
         """Check that there are ends, and that all numbers are finite."""

@@ -32,75 +32,46 @@ class ChoiceKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VaryRange:
-    """A number of the cell file that may change.
+    """A number of the cell file that may change."""
 
-    Attributes:
-        address: Its address in the file: ``robots.kuka.base.x_mm``.
-        kind: What it belongs to.
-        name: Robot or task; empty for the part at rest.
-        index: Which component: x, y, z, roll, pitch, yaw of a pose; length, tilt, roll of a rod; the joint of
-            weights or of a start posture.
-        is_angle: Whether it is an angle, in [rad]; a length in [m] or a number otherwise.
-        lower: Lowest value.
-        upper: Highest value.
-        given: Value in the file; None where it is to be found.
-    """
-
-    address: str
-    kind: VariableKind
-    name: str
+    address: str  # its address in the file: ``robots.kuka.base.x_mm``
+    kind: VariableKind  # what it belongs to
+    name: str  # robot or task; empty for the part at rest
+    # which component: x, y, z, roll, pitch, yaw of a pose; length, tilt, roll of a rod; the joint of weights or of a
+    # start posture
     index: int
-    is_angle: bool
-    lower: float
-    upper: float
-    given: float | None
+    is_angle: bool  # whether it is an angle, in [rad]; a length in [m] or a number otherwise
+    lower: float  # lowest value
+    upper: float  # highest value
+    given: float | None  # value in the file; None where it is to be found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathRange:
-    """The joint path of a positioner, as a spline that may change.
+    """The joint path of a positioner, as a spline that may change."""
 
-    Attributes:
-        robot: Name of the positioner.
-        coefficients: Coefficients of each joint.
-        degree: Degree of the spline, 3 or 5.
-    """
-
-    robot: str
-    coefficients: int = 14
-    degree: int = 5
+    robot: str  # name of the positioner
+    coefficients: int = 14  # coefficients of each joint
+    degree: int = 5  # degree of the spline, 3 or 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LayoutChoice:
-    """A discrete choice.
+    """A discrete choice."""
 
-    Attributes:
-        address: Its address in the file: ``tasks.circle.robot``.
-        kind: What it is about.
-        name: Task or robot; empty for the mode.
-        options: What may be chosen; empty for all branches of a robot.
-    """
-
-    address: str
-    kind: ChoiceKind
-    name: str
-    options: tuple[str, ...] = ()
+    address: str  # its address in the file: ``tasks.circle.robot``
+    kind: ChoiceKind  # what it is about
+    name: str  # task or robot; empty for the mode
+    options: tuple[str, ...] = ()  # what may be chosen; empty for all branches of a robot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mirrored:
-    """Two bases of which the second is the mirror image of the first.
+    """Two bases of which the second is the mirror image of the first."""
 
-    Attributes:
-        robots: Names of both robots.
-        axis: Component of the positions that changes its sign: 0 for the plane yz, 1 for xz.
-        at: Where the plane stands along this axis in [m].
-    """
-
-    robots: tuple[str, str]
-    axis: int
-    at: float = 0.0
+    robots: tuple[str, str]  # names of both robots
+    axis: int  # component of the positions that changes its sign: 0 for the plane yz, 1 for xz
+    at: float = 0.0  # where the plane stands along this axis in [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,38 +85,26 @@ class KeepOut:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LayoutSettings:
-    """What a layout search may change, and within which bounds.
+    """What a layout search may change, and within which bounds."""
 
-    Attributes:
-        ranges: Numbers that may change.
-        paths: Joint paths of positioners that may change.
-        choices: Discrete choices.
-        equal: Addresses of ranges that have one value.
-        mirrored: Pairs of bases that are placed symmetrically.
-        keep_out: Areas without bases.
-        floor: Lowest and highest x and y of all bases in [m], shape (2, 2); infinite where there is no bound.
-        margin: Distance from its limits in [rad] that every turning joint is to keep.
-        margin_sliding: Distance from its limits in [m] that every sliding joint is to keep.
-        cost: Cost of a change by 0.1 m, by 10 deg or by a factor of 10, by the address of the range; 1 when absent.
-        singular: Least singular values of the arms that are to be kept, as shares of what is usual; None for the usual
-            share, as far as the job allows it.
-        misplacement: By how much every base may be off while all demands are kept; None where it need not be asked.
-        is_default: Whether the file says nothing of what may change.
-    """
-
-    ranges: tuple[VaryRange, ...]
-    paths: tuple[PathRange, ...] = ()
-    choices: tuple[LayoutChoice, ...] = ()
-    equal: tuple[tuple[str, ...], ...] = ()
-    mirrored: tuple[Mirrored, ...] = ()
-    keep_out: tuple[KeepOut, ...] = ()
+    ranges: tuple[VaryRange, ...]  # numbers that may change
+    paths: tuple[PathRange, ...] = ()  # joint paths of positioners that may change
+    choices: tuple[LayoutChoice, ...] = ()  # discrete choices
+    equal: tuple[tuple[str, ...], ...] = ()  # addresses of ranges that have one value
+    mirrored: tuple[Mirrored, ...] = ()  # pairs of bases that are placed symmetrically
+    keep_out: tuple[KeepOut, ...] = ()  # areas without bases
+    # lowest and highest x and y of all bases in [m], shape (2, 2); infinite where there is no bound
     floor: Array | None = None
-    margin: float = 0.0
-    margin_sliding: float = 0.0
+    margin: float = 0.0  # distance from its limits in [rad] that every turning joint is to keep
+    margin_sliding: float = 0.0  # distance from its limits in [m] that every sliding joint is to keep
+    # cost of a change by 0.1 m, by 10 deg or by a factor of 10, by the address of the range; 1 when absent
     cost: Mapping[str, float] = field(default_factory=dict)
+    # least singular values of the arms that are to be kept, as shares of what is usual; None for the usual share, as
+    # far as the job allows it
     singular: float | None = None
+    # by how much every base may be off while all demands are kept; None where it need not be asked
     misplacement: MisplacementEntry | None = None
-    is_default: bool = True
+    is_default: bool = True  # whether the file says nothing of what may change
 
     def without(self, addresses: Container[str]) -> "LayoutSettings":
         """The same without some numbers, which stay as they are, and what has one value with them."""

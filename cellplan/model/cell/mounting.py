@@ -14,14 +14,10 @@ SIDE_COUNT: Final = 48  # [-] sides of the prism round a column with a slanting 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """A column or a box between a robot's base and what carries it.
+    """A column or a box between a robot's base and what carries it."""
 
-    Attributes:
-        radius: Radius in [m] of a column; None for a box.
-        size: Edge lengths in [m] of a box along the base's x and y, seen along its z; None for a column.
-    """
-
-    radius: float | None = None
+    radius: float | None = None  # radius in [m] of a column; None for a box
+    # edge lengths in [m] of a box along the base's x and y, seen along its z; None for a column
     size: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -45,12 +41,9 @@ class Pedestal(Column):
 
     It stands upright in the world below the origin of the base, and a box turns with its heading; a base that leans a
     little leans on top of it.
-
-    Attributes:
-        floor: Height of the floor in the world in [m].
     """
 
-    floor: float = 0.0
+    floor: float = 0.0  # height of the floor in the world in [m]
 
     @property
     def name(self) -> str:
@@ -68,13 +61,9 @@ class Pedestal(Column):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hanger(Column):
-    """An upright column or box from a robot's base, which hangs upside down, to the ceiling.
+    """An upright column or box from a robot's base, which hangs upside down, to the ceiling."""
 
-    Attributes:
-        ceiling: Height of the ceiling in the world in [m].
-    """
-
-    ceiling: float
+    ceiling: float  # height of the ceiling in the world in [m]
 
     def solid(self, X_WB: Array) -> tuple[Solid, Array] | None:
         """The solid above a base and its pose in B; None for a base at the ceiling; see `Pedestal.solid`."""
@@ -85,13 +74,9 @@ class Hanger(Column):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bracket(Column):
-    """A column or box behind a robot's base, along its -z axis: to a wall, or to whatever carries it.
+    """A column or box behind a robot's base, along its -z axis: to a wall, or to whatever carries it."""
 
-    Attributes:
-        length: Length in [m].
-    """
-
-    length: float
+    length: float  # length in [m]
 
     def solid(self, X_WB: Array) -> tuple[Solid, Array] | None:  # noqa: ARG002 (it is fixed to the base)
         """The solid behind a base and its pose in B; see `Pedestal.solid`."""
@@ -100,13 +85,9 @@ class Bracket(Column):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wedge(Column):
-    """An upright column or box from the floor to a robot's tilted base, cut off along the plane of the base.
+    """An upright column or box from the floor to a robot's tilted base, cut off along the plane of the base."""
 
-    Attributes:
-        floor: Height of the floor in the world in [m].
-    """
-
-    floor: float = 0.0
+    floor: float = 0.0  # height of the floor in the world in [m]
 
     def solid(self, X_WB: Array) -> tuple[Solid, Array] | None:
         """The solid below a base and its pose in B; None where it would have no height; see `Pedestal.solid`."""

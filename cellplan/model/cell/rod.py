@@ -21,22 +21,14 @@ class Rod:
 
     The tip frame is the flange's, turned by ``roll`` about its z axis, then by ``tilt`` about the new y axis; the tip
     lies ``length`` along the z axis of this frame.
-
-    Attributes:
-        length: From the centre of the flange to the tip in [m].
-        tilt: Angle in [rad] between the rod and the flange's z axis.
-        roll: Angle in [rad] about the flange's z axis.
-        radius: Radius of the rod in [m].
-        stick_out: Length in [m] by which the tip lies beyond the end of the rod.
-        holder: What holds it on the flange; None for a rod that begins at the flange.
     """
 
-    length: float
-    tilt: float
-    roll: float
-    radius: float
-    stick_out: float = 0.0
-    holder: Holder | None = None
+    length: float  # from the centre of the flange to the tip in [m]
+    tilt: float  # angle in [rad] between the rod and the flange's z axis
+    roll: float  # angle in [rad] about the flange's z axis
+    radius: float  # radius of the rod in [m]
+    stick_out: float = 0.0  # length in [m] by which the tip lies beyond the end of the rod
+    holder: Holder | None = None  # what holds it on the flange; None for a rod that begins at the flange
 
     @property
     def X_FT(self) -> Array:

@@ -14,17 +14,12 @@ CUBIC = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointPath:
-    """Joints of all robots over the nominal time: polynomials between breaks, continuous where two of them meet.
+    """Joints of all robots over the nominal time: polynomials between breaks, continuous where two of them meet."""
 
-    Attributes:
-        start: Stacked joint vector at the beginning, shape (nq,), in [rad] or [m].
-        breaks: Nominal times in [s] at which the pieces begin and the last one ends, increasing, shape (pieces + 1,).
-        nodes: Stacked joint vectors at the Chebyshev points of each piece, shape (nq, degree + 1) each.
-    """
-
-    start: Array
+    start: Array  # stacked joint vector at the beginning, shape (nq,), in [rad] or [m]
+    # nominal times in [s] at which the pieces begin and the last one ends, increasing, shape (pieces + 1,)
     breaks: Array
-    nodes: Sequence[Array]
+    nodes: Sequence[Array]  # stacked joint vectors at the Chebyshev points of each piece, shape (nq, degree + 1) each
 
     @classmethod
     def through(cls, times: Array, q: Array) -> "JointPath":

@@ -20,15 +20,10 @@ from cellplan.model.task.task import TIME_TOLERANCE, Task
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Clock:
-    """Nominal time of every row; a program that runs as it is written has the nominal time as its time.
+    """Nominal time of every row; a program that runs as it is written has the nominal time as its time."""
 
-    Attributes:
-        times: Times of the rows in [s], increasing from 0, shape (N,).
-        sigma: Nominal time of each row in [s], shape (N,), from 0; it never falls, and stays the same in a dwell.
-    """
-
-    times: Array
-    sigma: Array
+    times: Array  # times of the rows in [s], increasing from 0, shape (N,)
+    sigma: Array  # nominal time of each row in [s], shape (N,), from 0; it never falls, and stays the same in a dwell
 
     def __post_init__(self) -> None:
         """Check that both are clocks.
@@ -68,31 +63,23 @@ class Clock:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TaskSchedule:
-    """One task on the common clock of N samples.
+    """One task on the common clock of N samples."""
 
-    Attributes:
-        task: The task.
-        X_PT: Reference tool tip in P at each sample, shape (N, 4, 4); held still before the start and after the end.
-        V_PT_P: Reference twist of the tool relative to the part in P, linear first, shape (N, 6).
-        travelled: Length of path behind the tool in [m], shape (N,); it grows from cycle to cycle.
-        length: Length of the path on the surface in [m], of one cycle.
-        end: Time in [s] at which the path is done.
-        cycle_ends: Times in [s] at which the tool has come back to the pose of its start, all constrained
-            components together, one per cycle; none when it does not come back.
-        stops: Times in [s] at which a stretch of the path with its own start and stop of the time law begins or ends.
-        demanded: Stretches of time in [s] in which the feed of a process is demanded, as (from, to).
-        bulge: Largest distance in [m] of a smooth path from the straight lines between its points, else None.
-    """
-
-    task: Task
+    task: Task  # the task
+    # reference tool tip in P at each sample, shape (N, 4, 4); held still before the start and after the end
     X_PT: Array
-    V_PT_P: Array
-    travelled: Array
-    length: float
-    end: float
+    V_PT_P: Array  # reference twist of the tool relative to the part in P, linear first, shape (N, 6)
+    travelled: Array  # length of path behind the tool in [m], shape (N,); it grows from cycle to cycle
+    length: float  # length of the path on the surface in [m], of one cycle
+    end: float  # time in [s] at which the path is done
+    # times in [s] at which the tool has come back to the pose of its start, all constrained components together, one
+    # per cycle; none when it does not come back
     cycle_ends: tuple[float, ...] = ()
+    # times in [s] at which a stretch of the path with its own start and stop of the time law begins or ends
     stops: tuple[float, ...] = ()
+    # stretches of time in [s] in which the feed of a process is demanded, as (from, to)
     demanded: tuple[tuple[float, float], ...] = ()
+    # largest distance in [m] of a smooth path from the straight lines between its points, else None
     bulge: float | None = None
 
     @property
@@ -103,20 +90,14 @@ class TaskSchedule:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Schedule:
-    """All tasks on one clock.
+    """All tasks on one clock."""
 
-    Attributes:
-        times: Times of the samples in [s], evenly spaced from 0, shape (N,).
-        tasks: The tasks that are worked on, at the samples.
-        paths: The same tasks at any time; empty where they are known at the samples only.
-        extra_breaks: Further times in [s] that count as jumps: ends of panels where errors were too large, shape (K,).
-        clock: Nominal times of the samples, which are the times of the paths; None where these are the times.
-    """
-
-    times: Array
-    tasks: tuple[TaskSchedule, ...]
-    paths: tuple[ClockedPath, ...] = ()
+    times: Array  # times of the samples in [s], evenly spaced from 0, shape (N,)
+    tasks: tuple[TaskSchedule, ...]  # the tasks that are worked on, at the samples
+    paths: tuple[ClockedPath, ...] = ()  # the same tasks at any time; empty where they are known at the samples only
+    # further times in [s] that count as jumps: ends of panels where errors were too large, shape (K,)
     extra_breaks: Array = field(default_factory=lambda: np.zeros(0))
+    # nominal times of the samples, which are the times of the paths; None where these are the times
     clock: Clock | None = None
 
     @property
@@ -159,19 +140,12 @@ class Schedule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NearestSingular:
-    """The robot that is nearest to a singular configuration.
+    """The robot that is nearest to a singular configuration."""
 
-    Attributes:
-        robot: Its name.
-        task: Name of its task or grasp.
-        smallest: Smallest singular value of its own Jacobian in the rows that the task constrains.
-        stack: Smallest singular value of the Jacobian of all robots and tasks together.
-    """
-
-    robot: str
-    task: str
-    smallest: float
-    stack: float
+    robot: str  # its name
+    task: str  # name of its task or grasp
+    smallest: float  # smallest singular value of its own Jacobian in the rows that the task constrains
+    stack: float  # smallest singular value of the Jacobian of all robots and tasks together
 
     @property
     def words(self) -> str:
@@ -184,27 +158,20 @@ class NearestSingular:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resolution:
-    """Nodes and effort of a motion of the accurate mode.
+    """Nodes and effort of a motion of the accurate mode."""
 
-    Attributes:
-        integrator: What integrated the joints from the start on; ``euler_from`` is where the accurate one failed.
-        panels: Intervals of time on each of which all joints are one polynomial.
-        nodes: Times at which the joints were solved for.
-        sweeps: Passes over all nodes of a panel, added up.
-        solves: Systems of equations that were solved.
-        error_between: Bound of the tool error at the nodes and between them, in [m] or [rad]; None when it is unknown,
-            as with Euler's steps.
-        euler_from: Time in [s] from which on Euler's steps had to be taken; None when they never had to.
-        lost: The robot that is nearest to a singular configuration at that time; None when none is.
-    """
-
+    # what integrated the joints from the start on; ``euler_from`` is where the accurate one failed
     integrator: Integrator
-    panels: int
-    nodes: int
-    sweeps: int
-    solves: int
+    panels: int  # intervals of time on each of which all joints are one polynomial
+    nodes: int  # times at which the joints were solved for
+    sweeps: int  # passes over all nodes of a panel, added up
+    solves: int  # systems of equations that were solved
+    # bound of the tool error at the nodes and between them, in [m] or [rad]; None when it is unknown, as with Euler's
+    # steps
     error_between: float | None = None
+    # time in [s] from which on Euler's steps had to be taken; None when they never had to
     euler_from: float | None = None
+    # the robot that is nearest to a singular configuration at that time; None when none is
     lost: NearestSingular | None = None
 
     def __post_init__(self) -> None:
@@ -302,36 +269,26 @@ class Motion:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointTable:
-    """The joint positions of one robot: the content of its written table, read back.
+    """The joint positions of one robot: the content of its written table, read back."""
 
-    Attributes:
-        robot: Name of the robot.
-        joints: Joint names in the order of the columns.
-        times: Times of the rows in [s], shape (N,).
-        q: Joint positions in [rad] or [m], shape (N, n).
-        gaps: Name of what is not part of the program, by the first row after it.
-    """
-
-    robot: str
-    joints: tuple[str, ...]
-    times: Array
-    q: Array
+    robot: str  # name of the robot
+    joints: tuple[str, ...]  # joint names in the order of the columns
+    times: Array  # times of the rows in [s], shape (N,)
+    q: Array  # joint positions in [rad] or [m], shape (N, n)
+    # name of what is not part of the program, by the first row after it
     gaps: Mapping[int, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ClockTable:
-    """What happens at each row of a program: the content of its written clock.
-
-    Attributes:
-        gaps: Name of what is not part of the program, by the first row after it.
-    """
+    """What happens at each row of a program: the content of its written clock."""
 
     times: Array  # times of the rows in [s], shape (N,)
     sigma: Array  # nominal time of each row in [s], shape (N,)
     phases: tuple[str, ...]  # name of the phase of each row
     lengths: Mapping[str, Array]  # length of path in [m] behind the tool of each task, shape (N,), by task
     process: Mapping[str, NDArray[np.bool_]]  # whether the tool of each task is on its path, shape (N,), by task
+    # name of what is not part of the program, by the first row after it
     gaps: Mapping[int, str] = field(default_factory=dict)
 
 

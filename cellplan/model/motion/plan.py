@@ -60,21 +60,15 @@ Role = Carry | Work | Transfer | Hold
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Phase:
-    """A stretch of the nominal time of a program; a new phase begins whenever a role changes.
+    """A stretch of the nominal time of a program; a new phase begins whenever a role changes."""
 
-    Attributes:
-        name: Name of its only task, ``ALL_TASKS`` when it is the only one, ``work-2`` or ``transfer-2`` in a program
-            from home to home, or what lies between two.
-        roles: Role of every robot, by its name: those at work first, in the order of the tasks.
-        begin: Nominal time in [s] at which it begins; 0, as ``end``, while the plan is not on a clock.
-        end: Nominal time in [s] at which it ends.
-        in_program: Whether the program has rows for it; otherwise its motion is left to the operator of the cell.
-    """
-
+    # name of its only task, ``ALL_TASKS`` when it is the only one, ``work-2`` or ``transfer-2`` in a program from home
+    # to home, or what lies between two
     name: str
-    roles: Mapping[str, Role]
-    begin: float = 0.0
-    end: float = 0.0
+    roles: Mapping[str, Role]  # role of every robot, by its name: those at work first, in the order of the tasks
+    begin: float = 0.0  # nominal time in [s] at which it begins; 0, as ``end``, while the plan is not on a clock
+    end: float = 0.0  # nominal time in [s] at which it ends
+    # whether the program has rows for it; otherwise its motion is left to the operator of the cell
     in_program: bool = True
 
     def __post_init__(self) -> None:
@@ -109,20 +103,16 @@ class Phase:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """The phases of a program, and the tasks of its tools.
+    """The phases of a program, and the tasks of its tools."""
 
-    Attributes:
-        phases: All phases in their order, those without rows in the program among them; neighbours share their ends.
-        stops: Nominal times in [s] at which the time law brings the tool of a task to rest, by task.
-        dwells: Stretches of nominal time in [s] that take no less time in any program, as (from, to): the delays of
-            processes, and dwells.
-        process: Stretches of nominal time in [s] in which the tool of a task is on its path, by task; with the delays
-            of a process.
-    """
-
+    # all phases in their order, those without rows in the program among them; neighbours share their ends
     phases: tuple[Phase, ...] = ()
+    # nominal times in [s] at which the time law brings the tool of a task to rest, by task
     stops: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    # stretches of nominal time in [s] that take no less time in any program, as (from, to): the delays of processes,
+    # and dwells
     dwells: tuple[Interval, ...] = ()
+    # stretches of nominal time in [s] in which the tool of a task is on its path, by task; with the delays of a process
     process: Mapping[str, tuple[Interval, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -5,21 +5,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BetweenError:
-    """One error of a tool between the rows, in [m] or [rad].
+    """One error of a tool between the rows, in [m] or [rad]."""
 
-    Attributes:
-        largest: Largest one found between two neighbouring rows: in the middle of every step, and at ten subdivisions
-            of the worst steps and of those for which the bound is too wide.
-        at_s: Its instant in [s].
-        bound: No error between the rows is larger; None where the bound is wider than what is allowed, and the verdict
-            rests on ten subdivisions of every such step.
-        longest_step: A step in [s] that meets the tolerance for all tools, by the way errors grow with the step; None
-            where the error is small enough, or too large at the rows already.
-    """
-
+    # largest one found between two neighbouring rows: in the middle of every step, and at ten subdivisions of the worst
+    # steps and of those for which the bound is too wide
     largest: float
-    at_s: float
+    at_s: float  # its instant in [s]
+    # no error between the rows is larger; None where the bound is wider than what is allowed, and the verdict rests on
+    # ten subdivisions of every such step
     bound: float | None
+    # a step in [s] that meets the tolerance for all tools, by the way errors grow with the step; None where the error
+    # is small enough, or too large at the rows already
     longest_step: float | None = None
 
     @property

@@ -26,12 +26,7 @@ class Concern(Enum):
 
 @dataclass(frozen=True, slots=True)
 class CheckKind:
-    """What a check is.
-
-    Attributes:
-        time_exponent: A motion ``share ** time_exponent`` times as long passes, for a value ``share`` times the limit;
-            None where a slower motion does not help.
-    """
+    """What a check is."""
 
     name: str  # in records
     holds: str  # title where it passes
@@ -39,6 +34,8 @@ class CheckKind:
     group: str = ""  # heading of its failures on the terminal, where it is not the words of the name
     excess: Excess = Excess.SHARE  # what the worst of several is found by
     concern: Concern = Concern.OTHER  # what it is about
+    # a motion ``share ** time_exponent`` times as long passes, for a value ``share`` times the limit; None where a
+    # slower motion does not help
     time_exponent: float | None = None
     shrinks_with_step: bool = False  # whether its value shrinks with the square of the time between rows
 

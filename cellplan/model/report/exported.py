@@ -35,31 +35,27 @@ class Targets(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotRows:
-    """Rows of one robot in a program.
-
-    Attributes:
-        times: Times of the rows in [s], from 0, shape (N,); None in what was read from a format that states none.
-        process: Whether its tool is in process from each row to the next, shape (N,); None where a format states none.
-        marks: Rows at which it waits for the other robots, in their order; as many for every robot of a program.
-        rounding: Share of the shorter neighbouring segment within which the target rounds each row, 0 for a stop, at
-            most 0.5, shape (N,). None stands for the share of the job in rows to be written, and for a
-            format that states none in rows that were read.
-        X_PT: Its tool tip in the part frame in [m], shape (N, 4, 4), where a row is stated as a target on the part; NaN
-            in all other rows, None where there is no such row. In what was read, ``q`` is NaN in these rows but for
-            external axes.
-        configuration: Configuration of the arm that was read with each of these targets, shape (N, 4), as the format
-            counts it; None where none was read.
-    """
+    """Rows of one robot in a program."""
 
     robot: str  # name of the robot
     q: Array  # joint positions of the model in [rad] or [m], shape (N, n)
+    # times of the rows in [s], from 0, shape (N,); None in what was read from a format that states none
     times: Array | None = None
     qd: Array | None = None  # joint velocities in [rad/s] or [m/s], shape (N, n); None where the format has none
+    # whether its tool is in process from each row to the next, shape (N,); None where a format states none
     process: NDArray[np.bool_] | None = None
+    # rows at which it waits for the other robots, in their order; as many for every robot of a program
     marks: tuple[int, ...] = ()
     stops: tuple[int, ...] = ()  # rows at which its tool stops on its path
+    # share of the shorter neighbouring segment within which the target rounds each row, 0 for a stop, at most 0.5,
+    # shape (N,). None stands for the share of the job in rows to be written, and for a format that states none in rows
+    # that were read.
     rounding: Array | None = None
+    # its tool tip in the part frame in [m], shape (N, 4, 4), where a row is stated as a target on the part; NaN in all
+    # other rows, None where there is no such row. In what was read, ``q`` is NaN in these rows but for external axes.
     X_PT: Array | None = None
+    # configuration of the arm that was read with each of these targets, shape (N, 4), as the format counts it; None
+    # where none was read
     configuration: NDArray[np.int_] | None = None
 
     def __len__(self) -> int:
@@ -93,16 +89,13 @@ class ExportFrame:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ExportJob:
-    """What a format writes.
-
-    Attributes:
-        notes: Lines for the head of every file: promise, allowed skew, deviations, digest of the run; without the
-            sign of a comment, of any characters.
-        blend: Largest share of the shorter neighbouring segment, 0 to 0.5, within which a target may round rows; 0 for
-            a stop at each row. Which rows these are: ``export.corners``. Rows may state less for each of them.
-    """
+    """What a format writes."""
 
     frame: ExportFrame  # which robots and programs
     programs: tuple[ProgramRows, ...]  # rows of the programs, in their order
+    # lines for the head of every file: promise, allowed skew, deviations, digest of the run; without the sign of a
+    # comment, of any characters
     notes: tuple[str, ...] = ()
+    # largest share of the shorter neighbouring segment, 0 to 0.5, within which a target may round rows; 0 for a stop at
+    # each row. Which rows these are: ``export.corners``. Rows may state less for each of them.
     blend: float = 0.0

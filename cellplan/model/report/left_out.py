@@ -38,17 +38,11 @@ NOTHING_LEFT_OUT: Final = "every pair was checked in full"
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """Bodies that were not judged in full against each other.
+    """Bodies that were not judged in full against each other."""
 
-    Attributes:
-        kind: Why.
-        bodies: Their names: a pair, all things of the surroundings, or a robot whose links have none.
-        reason: What is demanded instead, as text.
-    """
-
-    kind: LeftOutKind
-    bodies: tuple[str, ...]
-    reason: str
+    kind: LeftOutKind  # why
+    bodies: tuple[str, ...]  # their names: a pair, all things of the surroundings, or a robot whose links have none
+    reason: str  # what is demanded instead, as text
 
 
 def left_out_lines(kinds: Iterable[tuple[str, tuple[str, ...], str]], *, most: int = 3) -> list[str]:

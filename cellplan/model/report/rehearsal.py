@@ -16,42 +16,25 @@ Angles = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseFigures:
-    """Figures of ISO 9283:1998 at one programmed pose, in [m] and [rad]; RP is None for a single trial.
+    """Figures of ISO 9283:1998 at one programmed pose, in [m] and [rad]; RP is None for a single trial."""
 
-    Attributes:
-        at_s: Instant of the pose in [s].
-        AP_p: Distance of the attained positions' barycentre from the commanded position.
-        AP_abc: The same of the three angles, as amounts.
-        RP_l: Mean distance from the barycentre plus three standard deviations.
-        RP_abc: Three standard deviations of the three angles.
-    """
-
-    at_s: float
-    AP_p: float
-    AP_abc: Angles
-    RP_l: float | None
-    RP_abc: Angles | None
+    at_s: float  # instant of the pose in [s]
+    AP_p: float  # distance of the attained positions' barycentre from the commanded position
+    AP_abc: Angles  # the same of the three angles, as amounts
+    RP_l: float | None  # mean distance from the barycentre plus three standard deviations
+    RP_abc: Angles | None  # three standard deviations of the three angles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathFigures:
-    """Figures of ISO 9283:1998 along one path, in [m] and [rad]; RT is None for a single trial.
+    """Figures of ISO 9283:1998 along one path, in [m] and [rad]; RT is None for a single trial."""
 
-    Attributes:
-        AT_p: Largest distance of the barycentre line from the commanded path.
-        AT_p_at_s: Time of it in [s].
-        AT_abc: Largest mean deviation of the three angles.
-        RT_p: Largest mean distance from the barycentre plus three standard deviations.
-        RT_p_at_s: Time of it in [s].
-        RT_abc: Largest three standard deviations of the three angles.
-    """
-
-    AT_p: float
-    AT_p_at_s: float
-    AT_abc: Angles
-    RT_p: float | None
-    RT_p_at_s: float | None
-    RT_abc: Angles | None
+    AT_p: float  # largest distance of the barycentre line from the commanded path
+    AT_p_at_s: float  # time of it in [s]
+    AT_abc: Angles  # largest mean deviation of the three angles
+    RT_p: float | None  # largest mean distance from the barycentre plus three standard deviations
+    RT_p_at_s: float | None  # time of it in [s]
+    RT_abc: Angles | None  # largest three standard deviations of the three angles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,58 +63,35 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Round:
-    """One execution on the real cell.
+    """One execution on the real cell."""
 
-    Attributes:
-        number: 0 is the program as it was solved.
-        position: Largest true position error by task in [m].
-        orientation: Largest true orientation error by task in [rad].
-        share: Largest true error as a share of its tolerance.
-        measured_share: The same of the measured errors, noise included, which the correction uses.
-    """
-
-    number: int
-    position: Mapping[str, float]
-    orientation: Mapping[str, float]
-    share: float
-    measured_share: float
+    number: int  # 0 is the program as it was solved
+    position: Mapping[str, float]  # largest true position error by task in [m]
+    orientation: Mapping[str, float]  # largest true orientation error by task in [rad]
+    share: float  # largest true error as a share of its tolerance
+    measured_share: float  # the same of the measured errors, noise included, which the correction uses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Correction:
-    """Result of the correction from pass to pass on one real cell.
+    """Result of the correction from pass to pass on one real cell."""
 
-    Attributes:
-        outcome: How it ended.
-        rounds: Every execution.
-        best: Number of the round with the smallest measured error: the one that is kept.
-        accuracy: True errors of that round.
-        references: References of the nominal cell in this pass.
-        q: Its joint positions in [rad] or [m], shape (N, nq).
-    """
-
-    outcome: Outcome
-    rounds: tuple[Round, ...]
-    best: int
-    accuracy: tuple[TaskAccuracy, ...]
-    references: Schedule
-    q: Array
+    outcome: Outcome  # how it ended
+    rounds: tuple[Round, ...]  # every execution
+    best: int  # number of the round with the smallest measured error: the one that is kept
+    accuracy: tuple[TaskAccuracy, ...]  # true errors of that round
+    references: Schedule  # references of the nominal cell in this pass
+    q: Array  # its joint positions in [rad] or [m], shape (N, nq)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trial:
-    """One real cell.
+    """One real cell."""
 
-    Attributes:
-        draw: How it differs from the written one.
-        before: True errors of the program as it was solved.
-        correction: Result of the correction; None when it was not requested.
-        in_pass: True errors with correction within the pass; None when it was not requested or diverged.
-    """
-
-    draw: Draw
-    before: tuple[TaskAccuracy, ...]
-    correction: Correction | None
+    draw: Draw  # how it differs from the written one
+    before: tuple[TaskAccuracy, ...]  # true errors of the program as it was solved
+    correction: Correction | None  # result of the correction; None when it was not requested
+    # true errors with correction within the pass; None when it was not requested or diverged
     in_pass: tuple[TaskAccuracy, ...] | None
 
     @property
@@ -150,47 +110,30 @@ class CorrectedProgram:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RunRehearsal:
-    """One run of the cell, rehearsed.
+    """One run of the cell, rehearsed."""
 
-    Attributes:
-        name: Name of the only task in a run of its own; None when all tasks are worked on together.
-        times: Times in [s], shape (N,).
-        judged_from: First sample that is judged, by task: before it the tool may still be coming to its path.
-        trials: The real cells.
-        before: Figures over all trials by task, as solved.
-        after: The same after the correction; None when it was not requested.
-        corrected: The corrected program; None when there is not one for one real cell.
-    """
-
-    name: str | None
-    times: Array
+    name: str | None  # name of the only task in a run of its own; None when all tasks are worked on together
+    times: Array  # times in [s], shape (N,)
+    # first sample that is judged, by task: before it the tool may still be coming to its path
     judged_from: Mapping[str, int]
-    trials: tuple[Trial, ...]
-    before: Mapping[str, IsoFigures]
-    after: Mapping[str, IsoFigures] | None
-    corrected: CorrectedProgram | None
+    trials: tuple[Trial, ...]  # the real cells
+    before: Mapping[str, IsoFigures]  # figures over all trials by task, as solved
+    after: Mapping[str, IsoFigures] | None  # the same after the correction; None when it was not requested
+    corrected: CorrectedProgram | None  # the corrected program; None when there is not one for one real cell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rehearsal(Presented):
-    """A program rehearsed on real cells.
+    """A program rehearsed on real cells."""
 
-    Attributes:
-        cell: The cell that was solved, with every start posture filled in.
-        errors: What was stated of the real one.
-        runs: One, or one per task in the pairwise mode.
-        checks: Every verified statement: true errors over all trials, then what the program, or the corrected one,
-            fails on the written cell.
-        has_feedback: Whether correction from pass to pass was requested.
-        has_in_pass: Whether correction within the pass was requested.
-    """
-
-    cell: Cell
-    errors: CellErrors
-    runs: tuple[RunRehearsal, ...]
+    cell: Cell  # the cell that was solved, with every start posture filled in
+    errors: CellErrors  # what was stated of the real one
+    runs: tuple[RunRehearsal, ...]  # one, or one per task in the pairwise mode
+    # every verified statement: true errors over all trials, then what the program, or the corrected one, fails on the
+    # written cell
     checks: tuple[Check, ...]
-    has_feedback: bool
-    has_in_pass: bool
+    has_feedback: bool  # whether correction from pass to pass was requested
+    has_in_pass: bool  # whether correction within the pass was requested
 
     @property
     def passed(self) -> bool:

@@ -85,96 +85,58 @@ class Check:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TaskAccuracy:
-    """Tool error of one task on the part, recomputed from the written tables.
+    """Tool error of one task on the part, recomputed from the written tables."""
 
-    Attributes:
-        task: Name of the task.
-        robot: Name of the operator.
-        position_error: Position error in P in [m], shape (N, 3); unconstrained components are zero.
-        orientation_error: Rotation vector of ``R_PT,desired R_PT^T`` in P in [rad], shape (N, 3); likewise.
-        path_length: Length of the path on the surface in [m].
-        path_bulge: Largest distance in [m] of a smooth path from the straight lines between its points, else None.
-        start_s: Instant at which the path begins.
-        end_s: Instant at which the path is done.
-        between: Errors between the rows; None where they were not evaluated.
-        judged_from: Time in [s] from which its errors are judged: 0 unless the tool needs time to settle.
-    """
-
-    task: str
-    robot: str
-    position_error: Array
-    orientation_error: Array
-    path_length: float
-    start_s: float
-    end_s: float
-    between: BetweenRows | None = None
+    task: str  # name of the task
+    robot: str  # name of the operator
+    position_error: Array  # position error in P in [m], shape (N, 3); unconstrained components are zero
+    orientation_error: Array  # rotation vector of ``R_PT,desired R_PT^T`` in P in [rad], shape (N, 3); likewise
+    path_length: float  # length of the path on the surface in [m]
+    start_s: float  # instant at which the path begins
+    end_s: float  # instant at which the path is done
+    between: BetweenRows | None = None  # errors between the rows; None where they were not evaluated
+    # largest distance in [m] of a smooth path from the straight lines between its points, else None
     path_bulge: float | None = None
-    judged_from: float = 0.0
+    judged_from: float = 0.0  # time in [s] from which its errors are judged: 0 unless the tool needs time to settle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ClosureAccuracy:
-    """How far the tool of a further holder strays from its grasp, recomputed from the written tables.
+    """How far the tool of a further holder strays from its grasp, recomputed from the written tables."""
 
-    Attributes:
-        robot: Name of the holder.
-        axes: Components that the grasp keeps, in the order x, y, z, rx, ry, rz.
-        position_error: Position error in P in [m], shape (N, 3); components that the grasp leaves open are zero.
-        orientation_error: Rotation vector of ``R_PT,desired R_PT^T`` in P in [rad], shape (N, 3); likewise.
-        between: Errors between the rows; None where they were not evaluated.
-    """
-
-    robot: str
-    axes: tuple[int, ...]
-    position_error: Array
-    orientation_error: Array
-    between: BetweenRows | None = None
+    robot: str  # name of the holder
+    axes: tuple[int, ...]  # components that the grasp keeps, in the order x, y, z, rx, ry, rz
+    position_error: Array  # position error in P in [m], shape (N, 3); components that the grasp leaves open are zero
+    orientation_error: Array  # rotation vector of ``R_PT,desired R_PT^T`` in P in [rad], shape (N, 3); likewise
+    between: BetweenRows | None = None  # errors between the rows; None where they were not evaluated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolDepth:
-    """How deep the tool of one task stands in the part, or beyond it, along the tool's axis.
+    """How deep the tool of one task stands in the part, or beyond it, along the tool's axis."""
 
-    Attributes:
-        task: Name of the task.
-        robot: Name of the operator.
-        depth: Largest depth in [m]; 0 when the tool is free or just touches.
-        at_s: Its instant in [s]; None where a path is judged before it has a clock.
-        limit: Depth that is allowed in [m].
-        body: Deepest element of the tool: ``axis``, or the name of a body.
-    """
-
-    task: str
-    robot: str
-    depth: float
-    at_s: float | None
-    limit: float
-    body: str
+    task: str  # name of the task
+    robot: str  # name of the operator
+    depth: float  # largest depth in [m]; 0 when the tool is free or just touches
+    at_s: float | None  # its instant in [s]; None where a path is judged before it has a clock
+    limit: float  # depth that is allowed in [m]
+    body: str  # deepest element of the tool: ``axis``, or the name of a body
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Standoff:
-    """How far the tip of one task's tool is from the part along its path, in [m].
+    """How far the tip of one task's tool is from the part along its path, in [m]."""
 
-    Attributes:
-        task: Name of the task.
-        nearest: Smallest and largest distance from the nearest point of the part; 0 where the tip is inside it.
-        along: The same along the tool's axis; inf where the axis does not meet the part ahead of the tip.
-        worst_nearest: Distance from the nearest point where the tip is farthest from what the task states.
-        worst_along: The same along the tool's axis.
-        at_s: Instant in [s] of these two; None where a path is judged before it has a clock.
-        is_off: Whether the tip is not where the task states, or not at the surface where it states nothing.
-        excused: Length of path in [m] of each stretch, by its name, that the task excuses.
-    """
-
-    task: str
+    task: str  # name of the task
+    # smallest and largest distance from the nearest point of the part; 0 where the tip is inside it
     nearest: tuple[float, float]
+    # the same along the tool's axis; inf where the axis does not meet the part ahead of the tip
     along: tuple[float, float]
-    worst_nearest: float
-    worst_along: float
-    at_s: float | None
-    is_off: bool
-    excused: Mapping[str, float]
+    worst_nearest: float  # distance from the nearest point where the tip is farthest from what the task states
+    worst_along: float  # the same along the tool's axis
+    at_s: float | None  # instant in [s] of these two; None where a path is judged before it has a clock
+    is_off: bool  # whether the tip is not where the task states, or not at the surface where it states nothing
+    excused: Mapping[str, float]  # length of path in [m] of each stretch, by its name, that the task excuses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,46 +165,31 @@ class JointUse:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotSpeed:
-    """How fast a robot moves in the world, between the samples.
+    """How fast a robot moves in the world, between the samples."""
 
-    Attributes:
-        tool_peak: Largest speed of the tool tip in [m/s].
-        tool_peak_at_s: Its instant.
-        share_above_reduced: Share of the cycle, 0..1, in which the tool tip is faster than ``REDUCED_SPEED``.
-        axis_peak: Largest speed of a point on a joint axis (shoulder, elbow, wrist) in [m/s].
-        axis: The joint whose axis that is.
-        axis_peak_at_s: Its instant.
-    """
-
-    tool_peak: float
-    tool_peak_at_s: float
-    share_above_reduced: float
-    axis_peak: float
-    axis: str
-    axis_peak_at_s: float
+    tool_peak: float  # largest speed of the tool tip in [m/s]
+    tool_peak_at_s: float  # its instant
+    share_above_reduced: float  # share of the cycle, 0..1, in which the tool tip is faster than ``REDUCED_SPEED``
+    axis_peak: float  # largest speed of a point on a joint axis (shoulder, elbow, wrist) in [m/s]
+    axis: str  # the joint whose axis that is
+    axis_peak_at_s: float  # its instant
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClearanceMinimum:
-    """Smallest distance of one class over the whole motion.
+    """Smallest distance of one class over the whole motion."""
 
-    Attributes:
-        minimum: Distance in [m], never above the truth; 0 when the pair touches; None when there is no such pair.
-        pair: Names of the two bodies, None when there is no such pair.
-        at_s: Instant in [s] at which the pair was found to be nearest.
-        certified: Whether it is proved, between the samples too, that nothing touches and either that the demanded
-            distance is kept or that it is not. Otherwise ``minimum`` is what is proved, and may be 0 without a contact.
-        exact: Whether the truth is above ``minimum`` by no more than 0.1 mm; otherwise it is a lower bound.
-        points: Where the two bodies are nearest, in the world in [m]; None when they touch or are not known.
-        accuracies: How far the real things may stick out of the two bodies in [m], each None when it is not stated.
-    """
-
+    # distance in [m], never above the truth; 0 when the pair touches; None when there is no such pair
     minimum: float | None = None
-    pair: tuple[str, str] | None = None
-    at_s: float | None = None
+    pair: tuple[str, str] | None = None  # names of the two bodies, None when there is no such pair
+    at_s: float | None = None  # instant in [s] at which the pair was found to be nearest
+    # whether it is proved, between the samples too, that nothing touches and either that the demanded distance is kept
+    # or that it is not. Otherwise ``minimum`` is what is proved, and may be 0 without a contact.
     certified: bool = False
-    exact: bool = True
+    exact: bool = True  # whether the truth is above ``minimum`` by no more than 0.1 mm; otherwise it is a lower bound
+    # where the two bodies are nearest, in the world in [m]; None when they touch or are not known
     points: tuple[Point, Point] | None = None
+    # how far the real things may stick out of the two bodies in [m], each None when it is not stated
     accuracies: tuple[float | None, float | None] | None = None
 
 
@@ -270,55 +217,37 @@ class Contact:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ClearanceReport:
-    """Results on distances.
+    """Results on distances."""
 
-    Attributes:
-        minima: Smallest distance per class.
-        contacts: Everything that touches, allowed or not.
-        exclusions: Pairs that were not checked, as (first, second, reason).
-        pair_count: Pairs that were checked.
-        curve_times: Times of the plotted curve in [s], shape (K,).
-        curves: Per class a distance in [m] that is kept all through the stretch of the program (one of 200) that holds
-            the instant, shape (K,) each; exact to 0.1 mm at the minimum, elsewhere below what is reached in the
-            middle of the stretch by no more than about a twentieth and a millimetre.
-        closest: The closest pairs that are to keep the demanded distance, nearest first.
-        not_certified: Pairs that were not found to touch or to come nearer than demanded, and not proved not to.
-        distance_queries: Number of distance queries to the collision engine.
-        contact_queries: Number of contact queries.
-        cut_steps: Number of steps between samples that had to be searched in finer steps.
-        left_out: What was not judged in full, but for two links of one robot's file.
-    """
-
-    minima: Mapping[ClearanceClass, ClearanceMinimum]
-    contacts: tuple[Contact, ...]
-    exclusions: tuple[tuple[str, str, str], ...]
-    pair_count: int
-    curve_times: Array
+    minima: Mapping[ClearanceClass, ClearanceMinimum]  # smallest distance per class
+    contacts: tuple[Contact, ...]  # everything that touches, allowed or not
+    exclusions: tuple[tuple[str, str, str], ...]  # pairs that were not checked, as (first, second, reason)
+    pair_count: int  # pairs that were checked
+    curve_times: Array  # times of the plotted curve in [s], shape (K,)
+    # per class a distance in [m] that is kept all through the stretch of the program (one of 200) that holds the
+    # instant, shape (K,) each; exact to 0.1 mm at the minimum, elsewhere below what is reached in the middle of the
+    # stretch by no more than about a twentieth and a millimetre
     curves: Mapping[ClearanceClass, Array]
-    closest: tuple[ClosePair, ...] = ()
+    closest: tuple[ClosePair, ...] = ()  # the closest pairs that are to keep the demanded distance, nearest first
+    # pairs that were not found to touch or to come nearer than demanded, and not proved not to
     not_certified: tuple[tuple[str, str], ...] = ()
-    distance_queries: int = 0
-    contact_queries: int = 0
-    cut_steps: int = 0
-    left_out: tuple[LeftOut, ...] = ()
+    distance_queries: int = 0  # number of distance queries to the collision engine
+    contact_queries: int = 0  # number of contact queries
+    cut_steps: int = 0  # number of steps between samples that had to be searched in finer steps
+    left_out: tuple[LeftOut, ...] = ()  # what was not judged in full, but for two links of one robot's file
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Conditioning:
-    """How far the motion stays from singularities (mixed units: metres and radians).
+    """How far the motion stays from singularities (mixed units: metres and radians)."""
 
-    Attributes:
-        stack: Smallest singular value of the cooperation Jacobian's constrained rows J, over the joints that may move,
-            shape (N,).
-        condition: Smallest by largest singular value of J, shape (N,): 1 when all directions are alike, 0 when it is
-            singular.
-        manipulability: ``sqrt(det(J J^T))``, the product of the singular values of J, shape (N,).
-        robots: Smallest singular value of each operator's own block and of each holder's, shape (N,) each.
-    """
-
+    # smallest singular value of the cooperation Jacobian's constrained rows J, over the joints that may move, shape
+    # (N,)
     stack: Array
+    # smallest by largest singular value of J, shape (N,): 1 when all directions are alike, 0 when it is singular
     condition: Array
-    manipulability: Array
+    manipulability: Array  # ``sqrt(det(J J^T))``, the product of the singular values of J, shape (N,)
+    # smallest singular value of each operator's own block and of each holder's, shape (N,) each
     robots: Mapping[str, Array]
 
     @property

@@ -18,36 +18,23 @@ class SkewLimit(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AllowedSkew:
-    """Largest skew of two clocks that is proved to keep one demand.
+    """Largest skew of two clocks that is proved to keep one demand."""
 
-    Attributes:
-        limit: The demand.
-        skew: In [s], either clock ahead of the other; ``MOST_SKEW`` where it is that or more.
-        subject: Task, grasp or bodies that limit it; empty where nothing does.
-        at_s: Time of the part's clock, or else of the first robot's, in [s] at which it does; None likewise.
-    """
-
-    limit: SkewLimit
-    skew: float
-    subject: str = ""
+    limit: SkewLimit  # the demand
+    skew: float  # in [s], either clock ahead of the other; ``MOST_SKEW`` where it is that or more
+    subject: str = ""  # task, grasp or bodies that limit it; empty where nothing does
+    # time of the part's clock, or else of the first robot's, in [s] at which it does; None likewise
     at_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairSkew:
-    """Two robots whose clocks are not the same.
+    """Two robots whose clocks are not the same."""
 
-    Attributes:
-        first: The one robot.
-        second: The other one.
-        limits: What each demand allows; a demand that does not depend on the two is left out.
-        stated: Largest difference in [s] that is stated of their clocks; None for nothing stated.
-    """
-
-    first: str
-    second: str
-    limits: tuple[AllowedSkew, ...]
-    stated: float | None = None
+    first: str  # the one robot
+    second: str  # the other one
+    limits: tuple[AllowedSkew, ...]  # what each demand allows; a demand that does not depend on the two is left out
+    stated: float | None = None  # largest difference in [s] that is stated of their clocks; None for nothing stated
 
     @property
     def least(self) -> AllowedSkew | None:
@@ -67,31 +54,20 @@ class PairSkew:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolSkew:
-    """Error of a tool on the part that another controller carries, by the skew of the two clocks.
+    """Error of a tool on the part that another controller carries, by the skew of the two clocks."""
 
-    Attributes:
-        name: Name of the task, or of the grasp of a further holder.
-        robot: The robot of the tool.
-        carrier: The first holder of the part.
-        speed: Largest speed of the tool in the components that are constrained in [m/s]: what a skew costs.
-        by_position: Skew in [s] that keeps the tolerance in position; ``MOST_SKEW`` where it is that or more.
-        by_orientation: Likewise the tolerance in orientation.
-        at_s: Time in [s] at which the smaller one is least; None where nothing limits it.
-        position: Upper bound of the position error in [m] at the skew that is stated; None for nothing stated.
-        orientation: Likewise of the orientation error in [rad].
-        shortest_cycle: Time in [s] that the program has to take, all of it slower by one factor, to keep the tolerance
-            at that skew; None for nothing stated, 0 where any time does, and inf where none does.
-    """
-
-    name: str
-    robot: str
-    carrier: str
-    speed: float
-    by_position: float
-    by_orientation: float
-    at_s: float | None
+    name: str  # name of the task, or of the grasp of a further holder
+    robot: str  # the robot of the tool
+    carrier: str  # the first holder of the part
+    speed: float  # largest speed of the tool in the components that are constrained in [m/s]: what a skew costs
+    by_position: float  # skew in [s] that keeps the tolerance in position; ``MOST_SKEW`` where it is that or more
+    by_orientation: float  # likewise the tolerance in orientation
+    at_s: float | None  # time in [s] at which the smaller one is least; None where nothing limits it
+    # upper bound of the position error in [m] at the skew that is stated; None for nothing stated
     position: float | None = None
-    orientation: float | None = None
+    orientation: float | None = None  # likewise of the orientation error in [rad]
+    # time in [s] that the program has to take, all of it slower by one factor, to keep the tolerance at that skew; None
+    # for nothing stated, 0 where any time does, and inf where none does
     shortest_cycle: float | None = None
 
     @property
@@ -102,17 +78,11 @@ class ToolSkew:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SkewReport:
-    """Allowed skew of a run.
+    """Allowed skew of a run."""
 
-    Attributes:
-        pairs: All pairs of robots whose clocks are not the same, in the order of the cell.
-        tools: All tools on a part that another controller carries.
-        groups: Robots that share a clock.
-    """
-
-    pairs: tuple[PairSkew, ...]
-    tools: tuple[ToolSkew, ...]
-    groups: tuple[tuple[str, ...], ...]
+    pairs: tuple[PairSkew, ...]  # all pairs of robots whose clocks are not the same, in the order of the cell
+    tools: tuple[ToolSkew, ...]  # all tools on a part that another controller carries
+    groups: tuple[tuple[str, ...], ...]  # robots that share a clock
 
     @property
     def least(self) -> PairSkew | None:

@@ -10,88 +10,54 @@ from cellplan.model.settings.units import si_or_none
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopInstant:
-    """When a figure of a stop is reached.
+    """When a figure of a stop is reached."""
 
-    Attributes:
-        stopped: Name of the robot that stops.
-        going: Name of the robot that goes on.
-        at_s: Instant in [s] at which the one stops.
-        path_s: Time in [s] of the program that the other has reached; more than ``at_s``, or the same.
-    """
-
-    stopped: str
-    going: str
-    at_s: float
-    path_s: float
+    stopped: str  # name of the robot that stops
+    going: str  # name of the robot that goes on
+    at_s: float  # instant in [s] at which the one stops
+    path_s: float  # time in [s] of the program that the other has reached; more than ``at_s``, or the same
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopDepth:
-    """Greatest depth of the tool of a task in the part while the tool, or what carries the part, has stopped.
+    """Greatest depth of the tool of a task in the part while the tool, or what carries the part, has stopped."""
 
-    Attributes:
-        task: Name of the task.
-        depth: Depth in [m].
-        worst: When it is reached; None where the tool is never deeper than zero.
-    """
-
-    task: str
-    depth: float
-    worst: StopInstant | None
+    task: str  # name of the task
+    depth: float  # depth in [m]
+    worst: StopInstant | None  # when it is reached; None where the tool is never deeper than zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopDistance:
-    """Smallest distance of two robots, and of the part that one of them carries, while one of them has stopped.
+    """Smallest distance of two robots, and of the part that one of them carries, while one of them has stopped."""
 
-    Attributes:
-        robots: Names of the two robots.
-        distance: Smallest distance measured in [m], zero where they touch; inf where they are nowhere near.
-        proved: Distance in [m] that is proved to be kept by all that must keep a clearance.
-        bodies: The nearest pair, or the one that touches; None where none was measured.
-        worst: When it is reached; None likewise.
-        is_free: Whether it is proved that nothing touches.
-    """
-
-    robots: tuple[str, str]
-    distance: float
-    proved: float
-    bodies: tuple[str, str] | None
-    worst: StopInstant | None
-    is_free: bool
+    robots: tuple[str, str]  # names of the two robots
+    distance: float  # smallest distance measured in [m], zero where they touch; inf where they are nowhere near
+    proved: float  # distance in [m] that is proved to be kept by all that must keep a clearance
+    bodies: tuple[str, str] | None  # the nearest pair, or the one that touches; None where none was measured
+    worst: StopInstant | None  # when it is reached; None likewise
+    is_free: bool  # whether it is proved that nothing touches
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopGrip:
-    """Largest distance of the tool of a further holder from its grasp on the part while a holder has stopped.
+    """Largest distance of the tool of a further holder from its grasp on the part while a holder has stopped."""
 
-    Attributes:
-        robot: Name of the further holder.
-        distance: Distance in [m].
-        worst: When it is reached; None where it never leaves its grasp.
-    """
-
-    robot: str
-    distance: float
-    worst: StopInstant | None
+    robot: str  # name of the further holder
+    distance: float  # distance in [m]
+    worst: StopInstant | None  # when it is reached; None where it never leaves its grasp
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StopReport:
-    """What happens at worst when any one robot stops at any instant.
+    """What happens at worst when any one robot stops at any instant."""
 
-    Attributes:
-        runs_on: Time in [s] of its program that each robot still covers after another one stopped, by robot; robots
-            of controllers that do not state it are left out, as if they stopped at once.
-        depths: Depth of each task's tool.
-        distances: Distances of each pair of robots.
-        grips: Further holders.
-    """
-
+    # time in [s] of its program that each robot still covers after another one stopped, by robot; robots of controllers
+    # that do not state it are left out, as if they stopped at once
     runs_on: Mapping[str, float]
-    depths: tuple[StopDepth, ...]
-    distances: tuple[StopDistance, ...]
-    grips: tuple[StopGrip, ...]
+    depths: tuple[StopDepth, ...]  # depth of each task's tool
+    distances: tuple[StopDistance, ...]  # distances of each pair of robots
+    grips: tuple[StopGrip, ...]  # further holders
 
     @property
     def deepest(self) -> StopDepth | None:

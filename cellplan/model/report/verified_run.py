@@ -43,23 +43,14 @@ class UnsolvedRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class VerifiedMotion:
-    """One phase of a verified run, on its own time, which starts at 0.
+    """One phase of a verified run, on its own time, which starts at 0."""
 
-    Attributes:
-        name: Name of the phase among several; None for the only one of a program.
-        cell: The cell as it is in this phase.
-        moving: Names of the robots that may move.
-        schedule: Desired tool poses.
-        tables: Joint positions of each robot, read back from its table, by robot name.
-        report: What the checks found when the run was verified.
-    """
-
-    name: str | None
-    cell: Cell
-    moving: tuple[str, ...]
-    schedule: Schedule
-    tables: Mapping[str, JointTable]
-    report: Report
+    name: str | None  # name of the phase among several; None for the only one of a program
+    cell: Cell  # the cell as it is in this phase
+    moving: tuple[str, ...]  # names of the robots that may move
+    schedule: Schedule  # desired tool poses
+    tables: Mapping[str, JointTable]  # joint positions of each robot, read back from its table, by robot name
+    report: Report  # what the checks found when the run was verified
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

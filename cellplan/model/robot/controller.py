@@ -14,20 +14,14 @@ class ControllerZero:
     .. math:: c_i = s_i q_i + z_i + \sum_{j < i} k_{ij} c_j
 
     with the positions c of the controller and q of the model.
-
-    Attributes:
-        zero: Position z that the controller shows while the model reads zero, in [rad] or [m], shape (n,).
-        sign: Sense s, 1 or -1, shape (n,).
-        coupling: Factors k of controller positions of earlier joints, shape (n, n), zero on and above the diagonal.
-        source: Where this is known from.
-        limits: Smallest and largest position that the controller allows of what it shows, in [rad] or [m], shape
-            (n, 2), infinite where none is stated; None where none is at all.
     """
 
-    zero: Array
-    sign: Array
-    coupling: Array
-    source: str
+    zero: Array  # position z that the controller shows while the model reads zero, in [rad] or [m], shape (n,)
+    sign: Array  # sense s, 1 or -1, shape (n,)
+    coupling: Array  # factors k of controller positions of earlier joints, shape (n, n), zero on and above the diagonal
+    source: str  # where this is known from
+    # smallest and largest position that the controller allows of what it shows, in [rad] or [m], shape (n, 2), infinite
+    # where none is stated; None where none is at all
     limits: Array | None = None
 
     def __post_init__(self) -> None:

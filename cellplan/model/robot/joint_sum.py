@@ -11,19 +11,12 @@ ROUNDING = 1e-9  # [rad] of written angles
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointSum:
-    """A range of the sum of some joint angles of a robot.
+    """A range of the sum of some joint angles of a robot."""
 
-    Attributes:
-        joints: Names of the joints.
-        columns: Their numbers.
-        lower: Least sum in [rad].
-        upper: Largest sum in [rad].
-    """
-
-    joints: tuple[str, ...]
-    columns: tuple[int, ...]
-    lower: float
-    upper: float
+    joints: tuple[str, ...]  # names of the joints
+    columns: tuple[int, ...]  # their numbers
+    lower: float  # least sum in [rad]
+    upper: float  # largest sum in [rad]
 
     def of(self, q: Array) -> Array:
         """The sum at configurations of shape (..., n) in [rad], shape (...)."""

@@ -10,53 +10,32 @@ from cellplan.model.settings.robot import PayloadEntry
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisUse:
-    """Moment and inertia of the load about one of the last axes over a run.
+    """Moment and inertia of the load about one of the last axes over a run."""
 
-    Attributes:
-        joint: Name of the joint.
-        static_moment: Largest moment about its axis by gravity alone in [N m].
-        static_at_s: Its instant in [s].
-        moment: Largest moment about its axis by gravity and by the accelerations of the written motion in [N m].
-        moment_at_s: Its instant in [s].
-        inertia: Largest moment of inertia about its axis in [kg m^2].
-        inertia_at_s: Its instant in [s].
-    """
-
-    joint: str
-    static_moment: float
-    static_at_s: float
-    moment: float
-    moment_at_s: float
-    inertia: float
-    inertia_at_s: float
+    joint: str  # name of the joint
+    static_moment: float  # largest moment about its axis by gravity alone in [N m]
+    static_at_s: float  # its instant in [s]
+    moment: float  # largest moment about its axis by gravity and by the accelerations of the written motion in [N m]
+    moment_at_s: float  # its instant in [s]
+    inertia: float  # largest moment of inertia about its axis in [kg m^2]
+    inertia_at_s: float  # its instant in [s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LoadUse:
-    """What one robot carries.
+    """What one robot carries."""
 
-    Attributes:
-        robot: Name of the robot.
-        tool_mass: Mass of its tool in [kg]; None when it is not stated.
-        part_mass: Its share of the part in [kg], 0 when it does not hold it; None when it is not stated.
-        holders: Number of robots that share the part.
-        limits: What it may carry; None when it is not stated.
-        centre_F: Centre of the load in the flange frame in [m], shape (3,); None when a mass is not stated or nothing
-            is carried.
-        felt: Largest force that moves and holds the load, as the mass in [kg] that weighs as much; None likewise.
-        felt_at_s: Its instant in [s].
-        axes: The last three turning axes; empty likewise.
-    """
-
-    robot: str
-    tool_mass: float | None
-    part_mass: float | None
-    holders: int
-    limits: PayloadEntry | None
+    robot: str  # name of the robot
+    tool_mass: float | None  # mass of its tool in [kg]; None when it is not stated
+    part_mass: float | None  # its share of the part in [kg], 0 when it does not hold it; None when it is not stated
+    holders: int  # number of robots that share the part
+    limits: PayloadEntry | None  # what it may carry; None when it is not stated
+    # centre of the load in the flange frame in [m], shape (3,); None when a mass is not stated or nothing is carried
     centre_F: Array | None = None
+    # largest force that moves and holds the load, as the mass in [kg] that weighs as much; None likewise
     felt: float | None = None
-    felt_at_s: float | None = None
-    axes: tuple[AxisUse, ...] = ()
+    felt_at_s: float | None = None  # its instant in [s]
+    axes: tuple[AxisUse, ...] = ()  # the last three turning axes; empty likewise
 
     @property
     def known_mass(self) -> float:

@@ -12,23 +12,14 @@ CYCLE_TOL = 1e-9  # [-] of the whole time: cycles that differ by less are equall
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointDrift:
-    """How far one joint is at the end of each cycle from where it was at its start.
+    """How far one joint is at the end of each cycle from where it was at its start."""
 
-    Attributes:
-        robot: Name of the robot.
-        joint: Name of the joint.
-        is_revolute: Whether it turns rather than slides.
-        drift: Position at the end less position at the start of each cycle in [rad] or [m], shape (cycles,).
-        worst: Largest drift of a cycle, without its sign.
-        at_cycle: The cycle in which it is largest, counted from 1.
-    """
-
-    robot: str
-    joint: str
-    is_revolute: bool
-    drift: Array
-    worst: float
-    at_cycle: int
+    robot: str  # name of the robot
+    joint: str  # name of the joint
+    is_revolute: bool  # whether it turns rather than slides
+    drift: Array  # position at the end less position at the start of each cycle in [rad] or [m], shape (cycles,)
+    worst: float  # largest drift of a cycle, without its sign
+    at_cycle: int  # the cycle in which it is largest, counted from 1
 
     @property
     def display_unit(self) -> DisplayUnit:
@@ -38,17 +29,11 @@ class JointDrift:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Repeatability:
-    """Whether the joints come back when all tools do.
+    """Whether the joints come back when all tools do."""
 
-    Attributes:
-        cycle_times: Times in [s] at which all tools are at their start together, shape (cycles + 1,).
-        drifts: One entry per joint of every robot.
-        closes: Whether every joint comes back in every cycle, so that the program may be repeated as it is.
-    """
-
-    cycle_times: Array
-    drifts: tuple[JointDrift, ...]
-    closes: bool
+    cycle_times: Array  # times in [s] at which all tools are at their start together, shape (cycles + 1,)
+    drifts: tuple[JointDrift, ...]  # one entry per joint of every robot
+    closes: bool  # whether every joint comes back in every cycle, so that the program may be repeated as it is
 
     @property
     def cycles(self) -> int:

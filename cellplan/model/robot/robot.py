@@ -28,33 +28,21 @@ class JointKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Joint:
-    """One driven axis, given at the reference configuration in the robot's base frame B.
+    """One driven axis, given at the reference configuration in the robot's base frame B."""
 
-    Attributes:
-        name: Name in tables and reports.
-        kind: Revolute ([rad]) or prismatic ([m]).
-        parent: Index of the link that carries it, counted over joints first and followers after them; ``BASE`` for the
-            first of a chain.
-        axis_B: Unit direction, shape (3,).
-        point_B: A point on the axis in [m], shape (3,).
-        lower: Lowest allowed position in [rad] or [m]; -inf for a joint that may turn without end.
-        upper: Highest allowed position; +inf for a joint that may turn without end.
-        velocity: Largest allowed speed in [rad/s] or [m/s].
-        acceleration: Largest allowed acceleration, if known.
-        jerk: Largest allowed jerk, if known.
-        rated_velocity: Top speed of the arm itself, where the cell allows less; None where it does not.
-    """
-
-    name: str
-    kind: JointKind
+    name: str  # name in tables and reports
+    kind: JointKind  # revolute ([rad]) or prismatic ([m])
+    # index of the link that carries it, counted over joints first and followers after them; ``BASE`` for the first of a
+    # chain
     parent: int
-    axis_B: Array
-    point_B: Array
-    lower: float
-    upper: float
-    velocity: float
-    acceleration: float | None = None
-    jerk: float | None = None
+    axis_B: Array  # unit direction, shape (3,)
+    point_B: Array  # a point on the axis in [m], shape (3,)
+    lower: float  # lowest allowed position in [rad] or [m]; -inf for a joint that may turn without end
+    upper: float  # highest allowed position; +inf for a joint that may turn without end
+    velocity: float  # largest allowed speed in [rad/s] or [m/s]
+    acceleration: float | None = None  # largest allowed acceleration, if known
+    jerk: float | None = None  # largest allowed jerk, if known
+    # top speed of the arm itself, where the cell allows less; None where it does not
     rated_velocity: float | None = None
 
     @property
@@ -75,27 +63,16 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FollowerJoint:
-    """A joint that another one drives through a linkage (a mimic joint): ``q = ratio q_leader + offset``.
+    """A joint that another one drives through a linkage (a mimic joint): ``q = ratio q_leader + offset``."""
 
-    Attributes:
-        name: Name in messages.
-        kind: Revolute or prismatic.
-        parent: Index of the link that carries it, counted over joints first and followers after them.
-        axis_B: Unit direction at the reference configuration, shape (3,).
-        point_B: A point on the axis in [m], shape (3,).
-        leader: Index of the driving joint in ``RobotModel.joints``.
-        ratio: Follower's motion per leader's motion.
-        offset: Follower's position in [rad] or [m] when the leader reads zero.
-    """
-
-    name: str
-    kind: JointKind
-    parent: int
-    axis_B: Array
-    point_B: Array
-    leader: int
-    ratio: float
-    offset: float
+    name: str  # name in messages
+    kind: JointKind  # revolute or prismatic
+    parent: int  # index of the link that carries it, counted over joints first and followers after them
+    axis_B: Array  # unit direction at the reference configuration, shape (3,)
+    point_B: Array  # a point on the axis in [m], shape (3,)
+    leader: int  # index of the driving joint in ``RobotModel.joints``
+    ratio: float  # follower's motion per leader's motion
+    offset: float  # follower's position in [rad] or [m] when the leader reads zero
 
     @property
     def is_revolute(self) -> bool:
@@ -113,73 +90,47 @@ class Drive(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Body:
-    """A solid fixed to one link.
+    """A solid fixed to one link."""
 
-    Attributes:
-        name: Name in reports, unique within its robot.
-        link: Index of the joint that carries it, followers counted after joints; ``BASE`` for the foot of the robot.
-        shape: The solid, in its own frame.
-        X_BS: Pose of the shape's frame in B at the reference configuration (for tools: in F; for parts: in P).
-        accuracy: How far the real link may stick out of it in [m]; None for what the robot states for all its bodies.
-        link_name: The link that it belongs to as the robot's file names it; None for bodies that a cell adds.
-    """
-
-    name: str
-    link: int
-    shape: Solid
-    X_BS: Array
+    name: str  # name in reports, unique within its robot
+    link: int  # index of the joint that carries it, followers counted after joints; ``BASE`` for the foot of the robot
+    shape: Solid  # the solid, in its own frame
+    X_BS: Array  # pose of the shape's frame in B at the reference configuration (for tools: in F; for parts: in P)
+    # how far the real link may stick out of it in [m]; None for what the robot states for all its bodies
     accuracy: float | None = None
+    # the link that it belongs to as the robot's file names it; None for bodies that a cell adds
     link_name: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Link:
-    """A link by name, so that things can be mounted on it.
+    """A link by name, so that things can be mounted on it."""
 
-    Attributes:
-        name: Name as the robot's file has it.
-        index: Index of the joint that carries it; ``BASE`` for the foot of the robot.
-        X_BL: The frame in which poses on it are given, in B while all joints read zero.
-    """
-
-    name: str
-    index: int
-    X_BL: Array
+    name: str  # name as the robot's file has it
+    index: int  # index of the joint that carries it; ``BASE`` for the foot of the robot
+    X_BL: Array  # the frame in which poses on it are given, in B while all joints read zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotModel:
-    """A robot model: the content of its data sheet.
+    """A robot model: the content of its data sheet."""
 
-    Attributes:
-        name: Model name.
-        source: Where the figures come from.
-        joints: The driven joints, each after the driven one that carries it.
-        followers: Joints driven through linkages; they come after all joints in link numbering.
-        links: Links on which something can be mounted, by the names of the robot's file.
-        body_accuracy: How good the link bodies are that do not say it themselves; None when it is not stated.
-        payload: What it may carry; None when it is not stated.
-        controller: How its controller counts the joints; None when it is not stated.
-        reach: Reach as the maker publishes it; None when it is not stated.
-        flange_link: Index of the joint that carries the flange.
-        X_BF: Flange (mechanical interface) in B at the reference configuration, z out of the flange.
-        bodies: Link bodies.
-        disabled: Pairs of link bodies, by name, that its SRDF leaves out of collision checks, with the reason.
-    """
-
-    name: str
-    source: str
-    joints: tuple[Joint, ...]
-    flange_link: int
-    X_BF: Array
-    bodies: tuple[Body, ...]
+    name: str  # model name
+    source: str  # where the figures come from
+    joints: tuple[Joint, ...]  # the driven joints, each after the driven one that carries it
+    flange_link: int  # index of the joint that carries the flange
+    X_BF: Array  # flange (mechanical interface) in B at the reference configuration, z out of the flange
+    bodies: tuple[Body, ...]  # link bodies
+    # joints driven through linkages; they come after all joints in link numbering
     followers: tuple[FollowerJoint, ...] = ()
-    links: tuple[Link, ...] = ()
+    links: tuple[Link, ...] = ()  # links on which something can be mounted, by the names of the robot's file
+    # how good the link bodies are that do not say it themselves; None when it is not stated
     body_accuracy: BodyAccuracyEntry | None = None
-    payload: PayloadEntry | None = None
+    payload: PayloadEntry | None = None  # what it may carry; None when it is not stated
+    # pairs of link bodies, by name, that its SRDF leaves out of collision checks, with the reason
     disabled: tuple[tuple[str, str, str], ...] = ()
-    controller: ControllerZero | None = None
-    reach: ReachEntry | None = None
+    controller: ControllerZero | None = None  # how its controller counts the joints; None when it is not stated
+    reach: ReachEntry | None = None  # reach as the maker publishes it; None when it is not stated
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""

@@ -55,11 +55,7 @@ class LinkSize:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotDescription:
-    """What a robot's file says.
-
-    Attributes:
-        locked: Joints off the chain with zero, or the nearest position within their limits, as a cell states them.
-    """
+    """What a robot's file says."""
 
     name: str  # name of the model
     source: str  # where the figures come from
@@ -70,6 +66,7 @@ class RobotDescription:
     X_BF: Array  # pose of the flange in the base while all joints read zero
     joints: tuple[DescribedJoint, ...]  # the driven joints
     mimics: tuple[DescribedMimic, ...]  # joints that follow others
+    # joints off the chain with zero, or the nearest position within their limits, as a cell states them
     locked: dict[str, float]
     links: tuple[LinkSize, ...]  # the links that have bodies
     cell_lines: str  # what to write into a cell, as YAML

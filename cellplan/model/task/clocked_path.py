@@ -22,22 +22,15 @@ Spans = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ClockedPath:
-    """Toolpath of one task on the common clock.
+    """Toolpath of one task on the common clock."""
 
-    Attributes:
-        task: The task.
-        toolpath: Where its tool must be.
-        corners: Times in [s] at which the stretches begin, and the one at which the last ends: each takes its own
-            start and stop of the time law. The cycles of a trajectory are its stretches.
-        behind: Length in [m] behind each stop of one cycle, shape (pieces + 1,).
-        quick: Way from lengths to parameters of the path for a few times at a time.
-    """
-
-    task: Task
-    toolpath: Toolpath
+    task: Task  # the task
+    toolpath: Toolpath  # where its tool must be
+    # times in [s] at which the stretches begin, and the one at which the last ends: each takes its own start and stop
+    # of the time law. The cycles of a trajectory are its stretches.
     corners: Array
-    behind: Array
-    quick: QuickParameters
+    behind: Array  # length in [m] behind each stop of one cycle, shape (pieces + 1,)
+    quick: QuickParameters  # way from lengths to parameters of the path for a few times at a time
 
     @property
     def start(self) -> float:

@@ -38,37 +38,23 @@ class RunDirection(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CirclePath:
-    """Circle in a plane of the part frame.
+    """Circle in a plane of the part frame."""
 
-    Attributes:
-        plane: The plane.
-        center: Centre on the plane's two axes in [m].
-        radius: Radius in [m].
-        start: Unit direction on the plane's axes from the centre to the start.
-        direction: Way round, seen from outside the surface.
-    """
-
-    plane: PlaneName
-    center: tuple[float, float]
-    radius: float
-    start: tuple[float, float] = (1.0, 0.0)
-    direction: RunDirection = RunDirection.COUNTERCLOCKWISE
+    plane: PlaneName  # the plane
+    center: tuple[float, float]  # centre on the plane's two axes in [m]
+    radius: float  # radius in [m]
+    start: tuple[float, float] = (1.0, 0.0)  # unit direction on the plane's axes from the centre to the start
+    direction: RunDirection = RunDirection.COUNTERCLOCKWISE  # way round, seen from outside the surface
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PolygonPath:
-    """Corners joined by straight sides, in a plane of the part frame (rectangle, rhombus, planar polyline).
+    """Corners joined by straight sides, in a plane of the part frame (rectangle, rhombus, planar polyline)."""
 
-    Attributes:
-        plane: The plane.
-        corners: Corner points on the plane's two axes in [m]; the first is the start.
-        is_closed: Whether the last corner is joined to the first.
-        direction: Way round of a closed path, seen from outside the surface; None: as the corners are listed.
-    """
-
-    plane: PlaneName
-    corners: tuple[tuple[float, float], ...]
-    is_closed: bool
+    plane: PlaneName  # the plane
+    corners: tuple[tuple[float, float], ...]  # corner points on the plane's two axes in [m]; the first is the start
+    is_closed: bool  # whether the last corner is joined to the first
+    # way round of a closed path, seen from outside the surface; None: as the corners are listed
     direction: RunDirection | None = None
 
 
@@ -82,48 +68,29 @@ class SpacePolylinePath:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SampledPath:
-    """Tool targets from a file: positions, and orientations where the file gives them.
+    """Tool targets from a file: positions, and orientations where the file gives them."""
 
-    Attributes:
-        source: File name for messages.
-        points: Tool tip positions in [m], shape (N, 3), expressed in P.
-        axes: Unit tool axes pointing into the part, shape (N, 3), or None.
-        rotations: Tool orientations, shape (N, 3, 3), or None; at most one of axes and rotations is given.
-        is_smooth: Whether a curve is interpolated through the points instead of straight sides.
-        is_closed: Whether the last point is joined to the first.
-        join: Distance in [m] within which points of the file were joined to the point before; 0 for none.
-        lines: Line of each point in the file, for messages; empty where they follow one another from line 2.
-    """
-
-    source: str
-    points: Array
-    axes: Array | None
-    rotations: Array | None
-    is_smooth: bool
-    is_closed: bool
-    join: float = 0.0
+    source: str  # file name for messages
+    points: Array  # tool tip positions in [m], shape (N, 3), expressed in P
+    axes: Array | None  # unit tool axes pointing into the part, shape (N, 3), or None
+    rotations: Array | None  # tool orientations, shape (N, 3, 3), or None; at most one of axes and rotations is given
+    is_smooth: bool  # whether a curve is interpolated through the points instead of straight sides
+    is_closed: bool  # whether the last point is joined to the first
+    join: float = 0.0  # distance in [m] within which points of the file were joined to the point before; 0 for none
+    # line of each point in the file, for messages; empty where they follow one another from line 2
     lines: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TimedPath:
-    """Trajectory from a file: tool targets with the times at which they are passed.
+    """Trajectory from a file: tool targets with the times at which they are passed."""
 
-    Attributes:
-        source: File name for messages.
-        times: Times in [s] from the start of the task, increasing from 0, shape (N,).
-        points: Tool tip positions in [m], shape (N, 3), expressed in P.
-        axes: Unit tool axes pointing into the part, shape (N, 3), or None.
-        rotations: Tool orientations, shape (N, 3, 3), or None; at most one of axes and rotations is given.
-        is_closed: Whether the last row repeats the first and the trajectory may go on from there.
-    """
-
-    source: str
-    times: Array
-    points: Array
-    axes: Array | None
-    rotations: Array | None
-    is_closed: bool
+    source: str  # file name for messages
+    times: Array  # times in [s] from the start of the task, increasing from 0, shape (N,)
+    points: Array  # tool tip positions in [m], shape (N, 3), expressed in P
+    axes: Array | None  # unit tool axes pointing into the part, shape (N, 3), or None
+    rotations: Array | None  # tool orientations, shape (N, 3, 3), or None; at most one of axes and rotations is given
+    is_closed: bool  # whether the last row repeats the first and the trajectory may go on from there
 
     def __post_init__(self) -> None:
         """Check that times increase and that nothing is missing or not finite."""
@@ -181,17 +148,11 @@ class StraightMove:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Service:
-    """Where and how long the tool of a robot is cleaned, and how often.
+    """Where and how long the tool of a robot is cleaned, and how often."""
 
-    Attributes:
-        posture: Configuration of the robot meanwhile in [rad] or [m], shape (n,).
-        takes: Time in [s] for which it stands there.
-        most: Number of tasks after which the tool is cleaned at the latest, before the next one.
-    """
-
-    posture: Array
-    takes: float
-    most: int
+    posture: Array  # configuration of the robot meanwhile in [rad] or [m], shape (n,)
+    takes: float  # time in [s] for which it stands there
+    most: int  # number of tasks after which the tool is cleaned at the latest, before the next one
 
 
 ViaPoint = Array | Service | None  # a configuration, a service, or None for home

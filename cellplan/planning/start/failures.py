@@ -23,17 +23,14 @@ class MissedGoal:
 
 @dataclass(slots=True, kw_only=True)
 class Failures:
-    """What the search has seen of each robot, by name.
+    """What the search has seen of each robot, by name."""
 
-    Attributes:
-        arrived: Configurations within the limits that reach a goal, each with that of the positioner.
-        off: Smallest distance in [m] and [rad] of a given start from its task or grasp, as the part was held.
-    """
-
+    # configurations within the limits that reach a goal, each with that of the positioner
     arrived: dict[str, list[tuple[Array, Array | None]]] = field(default_factory=dict)
     missed: dict[str, list[MissedGoal]] = field(default_factory=dict)  # goals that no configuration reaches
     misses: dict[str, int] = field(default_factory=dict)  # how many such goals there were
     beyond: dict[str, list[Array]] = field(default_factory=dict)  # reaching a goal with a joint out of its limits
+    # smallest distance in [m] and [rad] of a given start from its task or grasp, as the part was held
     off: dict[str, tuple[float, float]] = field(default_factory=dict)
     touching: list[Array] = field(default_factory=list)  # configurations of the whole cell in which something touches
 

@@ -134,20 +134,17 @@ class RetimedPath:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Retimer:
-    """What a joint path is retimed by.
-
-    Attributes:
-        feed_share: Share of the tools' speed limits that is taken up at the speed of the nominal time, at nominal times
-            in [s], shape (N,) to shape (N,).
-        errors: Errors of the tools between rows, which ``feed_share`` then bounds the speed by; None for no such limit.
-            Where they cannot be kept by a slower motion they are left to the checks.
-    """
+    """What a joint path is retimed by."""
 
     bounds: JointLimitsInTime  # limits of all joints
     step: float  # time between two rows in [s]
+    # share of the tools' speed limits that is taken up at the speed of the nominal time, at nominal times in [s], shape
+    # (N,) to shape (N,)
     feed_share: Callable[[Array], Array]
     slower: Slower  # factor by which rows must be slower for every limit to hold in them; at most 1 where all do
     fixed_rates: tuple[FixedRate, ...] = ()  # where the rate of the nominal time is demanded
+    # errors of the tools between rows, which ``feed_share`` then bounds the speed by; None for no such limit. Where
+    # they cannot be kept by a slower motion they are left to the checks.
     errors: StepTolerance | None = None
 
     def fastest(self, path: JointPath) -> RetimedPath:

@@ -18,34 +18,31 @@ def no_demands(_frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dialect:
-    """A program format.
-
-    Attributes:
-        read: What a reader of its own finds in these files: the rows of each program, in the order of the frame. It
-            knows no row beforehand. Raises ``InputError`` with file and line where a text is not such a file.
-        decimals: Of a degree, radian or millimetre in these files. Where ``kinds`` is not empty, so that the format is
-            the language of a controller, a robot may state its own.
-        demands: What its programs need of the cell, as calls that raise ``InputError`` where it is not there; all of
-            them are made before anything is computed.
-        is_thinned: Whether rows may be left out, as the target moves evenly between those that are written; not those
-            that lie on the cycle of the controller.
-        is_rounded: Whether its files round rows within a share of their segments; not those on the cycle either.
-    """
+    """A program format."""
 
     name: str  # name of the format
     title: str  # what it is, in a few words, for help and reports
     render: Render  # text of every file of a job, by its path in the folder of the export
+    # what a reader of its own finds in these files: the rows of each program, in the order of the frame. It knows no
+    # row beforehand. Raises ``InputError`` with file and line where a text is not such a file.
     read: Read
+    # of a degree, radian or millimetre in these files. Where ``kinds`` is not empty, so that the format is the language
+    # of a controller, a robot may state its own.
     decimals: int
     promises: tuple[Promise, ...]  # what the format can hold, the best first
     interpolation: Interpolation = Interpolation.LINEAR  # how its target moves the joints between two rows
     kinds: frozenset[KindName] = field(default_factory=frozenset)  # controllers that play it; empty for any
     at_cycle: bool = False  # whether rows lie on the cycle of the controller
+    # whether rows may be left out, as the target moves evenly between those that are written; not those that lie on the
+    # cycle of the controller
     is_thinned: bool = False
+    # whether its files round rows within a share of their segments; not those on the cycle either
     is_rounded: bool = False
     lags: bool = False  # whether the target follows with a latency, which must be stated before ``timed`` is promised
     split: int | None = None  # most rows of a file or routine; None for no limit
     shortest_time: float = 0.0  # shortest time in [s] between two rows that targets are known to keep; 0 for no limit
     is_proved: bool = False  # whether that time is documented by the maker, not only known from practice
     targets: tuple[Targets, ...] = (Targets.JOINTS,)  # what rows can state
+    # what its programs need of the cell, as calls that raise ``InputError`` where it is not there; all of them are made
+    # before anything is computed
     demands: Demands = no_demands

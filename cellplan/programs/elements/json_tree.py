@@ -27,16 +27,13 @@ Written = Raw | str | bool | None | Sequence["Written"] | Mapping[str, "Written"
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A value of a file.
-
-    Attributes:
-        content: A ``Raw`` number, a text, a flag or None; the texts of an array of numbers; or values of an array, or
-            of an object by key.
-    """
+    """A value of a file."""
 
     file: str  # name of the file in messages
     text: str  # content of the file
     at: int  # where the value begins there
+    # a ``Raw`` number, a text, a flag or None; the texts of an array of numbers; or values of an array, or of an object
+    # by key
     content: "Raw | str | bool | tuple[Raw, ...] | list[Value] | dict[str, Value] | None"
 
     @property

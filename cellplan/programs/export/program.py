@@ -29,13 +29,10 @@ from cellplan.programs.wide_table import read_wide_tables, render_wide_tables
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exporter:
-    """A format that is no program of single robots: it is made from all of a run.
-
-    Attributes:
-        read: What a reader of its own finds in these files: the tables of each motion, by robot.
-    """
+    """A format that is no program of single robots: it is made from all of a run."""
 
     render: Callable[[VerifiedRun], dict[str, str]]  # text of every file of a run, by its path in the folder
+    # what a reader of its own finds in these files: the tables of each motion, by robot
     read: Callable[[VerifiedRun, Mapping[str, str]], tuple[dict[str, JointTable], ...]]
     decimals: int  # of a second, degree or millimetre in these files
 

@@ -37,12 +37,7 @@ Errors = TypeVar("Errors", TaskAccuracy, ClosureAccuracy)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PathRows:
-    """Joint positions of a phase, straight between times.
-
-    Attributes:
-        corners: How far all joints may be off together at each time by rounding, with sign, shape (M, nq); see
-            ``margins.corners_at``.
-    """
+    """Joint positions of a phase, straight between times."""
 
     scene: Scene  # the cell as it is in the phase
     schedule: Schedule  # desired tool poses at the rows of the run
@@ -51,6 +46,8 @@ class PathRows:
     is_row: Flags  # which of them are rows of the run, where what the cell demands of rows holds, shape (M,)
     is_break: Flags  # which of them are needed, the joints being straight between these already, shape (M,)
     off: Array  # how far each joint may be from the straight motion by itself in each step, shape (M - 1, nq)
+    # how far all joints may be off together at each time by rounding, with sign, shape (M, nq); see
+    # ``margins.corners_at``
     corners: Array
 
     @property

@@ -37,15 +37,12 @@ class Mesh2D:
 
 @dataclass(slots=True)
 class Painter:
-    """Paints with one camera.
-
-    Attributes:
-        classes: Names of the classes of materials and tones, filled while painting.
-    """
+    """Paints with one camera."""
 
     camera: Camera
     low: Array  # left upper corner of what is shown of the sheet, shape (2,)
     high: Array  # right lower corner, shape (2,)
+    # names of the classes of materials and tones, filled while painting
     classes: dict[tuple[str, int], str] = field(default_factory=dict)
     focus: Array | None = None  # point of the sheet, shape (2,), near which facets must be in order; None: everywhere
 

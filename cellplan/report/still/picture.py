@@ -45,12 +45,7 @@ class Colour:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StillPicture:
-    """A picture of an instant.
-
-    Attributes:
-        mark: The points that matter in the world in [m]: the nearest points of a pair, shape (2, 3), a place, shape
-            (1, 3), or none, shape (0, 3).
-    """
+    """A picture of an instant."""
 
     title: str  # what it shows, in one line
     notes: tuple[str, ...]  # lines below the title
@@ -59,6 +54,8 @@ class StillPicture:
     lines: tuple[ShownLine, ...]  # lines, hidden by what is in front of them
     names: tuple[ShownName, ...]  # names of the robots
     materials: Mapping[str, Colour]  # colours by name
+    # the points that matter in the world in [m]: the nearest points of a pair, shape (2, 3), a place, shape (1, 3), or
+    # none, shape (0, 3)
     mark: Array
     label: str = ""  # what is written beside it
     floor: float | None = None  # height of the floor in [m]; None without one

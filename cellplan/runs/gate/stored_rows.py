@@ -26,15 +26,12 @@ LENGTH_TOL: Final = 1e-6  # [mm] of path: rounding of the arithmetic on another 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StoredRows:
-    """The rows of a program as they are on disk; of the run only times, nominal times and joint positions are used.
-
-    Attributes:
-        clock: The plan on its clock, and the desired tool poses: all from the cell but for the nominal times of the
-            rows of a retimed program, and the number of rows of transfer moves.
-    """
+    """The rows of a program as they are on disk; of the run only times, nominal times and joint positions are used."""
 
     stored: StoredRun
     program: DemandedProgram  # the phases that the cell demands, and the cell in each of them
+    # the plan on its clock, and the desired tool poses: all from the cell but for the nominal times of the rows of a
+    # retimed program, and the number of rows of transfer moves
     clock: ProgramClock
     tables: dict[str, JointTable]  # the joint tables with all rows of the program, by robot
     motion: Motion  # the same as one motion

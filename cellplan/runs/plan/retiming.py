@@ -133,16 +133,13 @@ def joint_bounds(cell: Cell) -> JointLimitsInTime:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowLimits:
-    """The limits of a cell in rows of one phase, as the checks compute them.
-
-    Attributes:
-        path: The joints over the nominal time; needed for the speed of the tools in the world only.
-    """
+    """The limits of a cell in rows of one phase, as the checks compute them."""
 
     scene: Scene  # the scene of the cell
     paths: tuple[ClockedPath, ...]  # paths of the tasks that are worked on
     bounds: JointLimitsInTime  # limits of all joints
     step: float  # time between two rows in [s]
+    # the joints over the nominal time; needed for the speed of the tools in the world only
     path: JointPath | None = None
     errors: StepErrors | None = None  # errors of the tools between rows; None where they do not bound the speed
 

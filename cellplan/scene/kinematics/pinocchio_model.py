@@ -16,13 +16,10 @@ MAX_AXES: Final = 48  # [-] of the robots that share a pinocchio model: 4 MB of 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellState:
-    """Kinematics of the whole cell at one stacked joint vector.
+    """Kinematics of the whole cell at one stacked joint vector."""
 
-    Attributes:
-        screws_W: Twist that unit speed of each joint gives what it carries, taken at the world origin, linear part
-            first, shape (6, nq), expressed in W.
-    """
-
+    # twist that unit speed of each joint gives what it carries, taken at the world origin, linear part first, shape (6,
+    # nq), expressed in W
     screws_W: Array
     X_WT: Array  # tool tip of each robot, in the order of the cell, shape (robots, 4, 4)
     X_WP: Array  # part frame, shape (4, 4)
@@ -30,16 +27,13 @@ class CellState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkState:
-    """Every link of the cell at one stacked joint vector; robot by robot, driven links before followers.
+    """Every link of the cell at one stacked joint vector; robot by robot, driven links before followers."""
 
-    Attributes:
-        screws_W: Twist that unit speed of each axis, driven or follower, gives what it carries, taken at the world
-            origin, linear part first, shape (6, links), expressed in W.
-        D: Displacement of each link from its place in B at the reference configuration to its place in the world, shape
-            (links, 4, 4): anything fixed to it is at ``D @ X_BS``.
-    """
-
+    # twist that unit speed of each axis, driven or follower, gives what it carries, taken at the world origin, linear
+    # part first, shape (6, links), expressed in W
     screws_W: Array
+    # displacement of each link from its place in B at the reference configuration to its place in the world, shape
+    # (links, 4, 4): anything fixed to it is at ``D @ X_BS``
     D: Array
 
 

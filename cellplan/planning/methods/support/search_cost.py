@@ -26,21 +26,16 @@ class Expansion:
     ``tr((R_d - R)^T (R_d - R))`` is the sum over the columns of R). With joint i alone at ``q_i + theta`` it is
 
     .. math:: h_i = |e - \sin\theta \, a_i - (1 - \cos\theta) \, n_i|^2
-
-    Attributes:
-        q: Stacked joint vector, shape (nq,).
-        e: Reference minus actual, all entries, shape (m,).
-        a: First derivative of the actual by each joint, shape (m, nq).
-        turns: Whether a joint moves the tools on circles; False also for one that drives others through a linkage,
-            whose way has no simple form, shape (nq,).
-        bends: What the second derivative is made of: about which axis and by how much each joint turns each point or
-            direction, and its first derivative without weights, shape (m / 3, 3, nq) each; the weights, shape (m, 1).
     """
 
-    q: Array
-    e: Array
-    a: Array
+    q: Array  # stacked joint vector, shape (nq,)
+    e: Array  # reference minus actual, all entries, shape (m,)
+    a: Array  # first derivative of the actual by each joint, shape (m, nq)
+    # whether a joint moves the tools on circles; False also for one that drives others through a linkage, whose way has
+    # no simple form, shape (nq,)
     turns: NDArray[np.bool_]
+    # what the second derivative is made of: about which axis and by how much each joint turns each point or direction,
+    # and its first derivative without weights, shape (m / 3, 3, nq) each; the weights, shape (m, 1)
     bends: tuple[Array, Array, Array]
 
     @property
