@@ -20,7 +20,8 @@ from cellplan.search.assign.problem.moving_blocks import joint_angles, with_colu
 from cellplan.search.assign.problem.rules import TaskRules, tasks_before
 from cellplan.search.assign.problem.stations import choose_stations
 from cellplan.search.assign.problem.table import Key, ModeSearch, ModeTable, TaskMode
-from cellplan.search.assign.schedules.blocks import BlockAnswer, solve_blocks
+from cellplan.search.assign.schedules.blocks import BlockAnswer
+from cellplan.search.assign.schedules.cover import best_blocks
 from cellplan.search.assign.schedules.greedy import greedy_schedule, improved
 from cellplan.search.assign.schedules.order import Refusal, SequencedBlocks, Sequencer
 from cellplan.search.assign.schedules.refined import Refinement
@@ -28,8 +29,7 @@ from cellplan.search.assign.schedules.solver import is_installed
 from cellplan.search.assign.schedules.transfers import TransferCertifier
 
 EFFORT: Final = (2.0, 5.0, 15.0, 60.0, 240.0)  # of the block model, in units of deterministic time, by --effort
-LITTLE: Final = 1.0  # likewise, of the figures beside the program
-MANY: Final = 25  # tasks; more of them get more work, by the square of their number
+LITTLE: Final = 0.5  # likewise, of the figures beside the program
 LOOKED_FOR: Final = (
     "torch and weld position",
     "reach",
@@ -59,7 +59,7 @@ class AssignmentSearch:
 
     def __init__(self, draft: AssignmentDraft, effort: int, *, most_stations: int | None = None) -> None:
         """Begin with nothing chosen; most_stations counts instead of that of the draft."""
-        self.draft, self._effort = draft, EFFORT[effort - 1] * max(1.0, len(draft.cell.tasks) / MANY) ** 2
+        self.draft, self._effort = draft, EFFORT[effort - 1]
         self._most_stations = most_stations or draft.settings.most_stations
         self._scene = Scene.from_cell(draft.cell)
         self._refusals: list[Refusal] = []  # of transfers, once for all schedules
@@ -121,15 +121,16 @@ class AssignmentSearch:
         exchanged = sequencer.ordered(improved(instance, greedy)).schedule
         answer = BlockAnswer(schedule=None, bound=None, is_proved=False)
         if is_installed():
-            answer = solve_blocks(instance, least=least, effort=self._effort, hint=exchanged)
+            answer = best_blocks(instance, least=least, effort=self._effort, hint=exchanged)
         schedules = [exchanged] if answer.schedule is None else [exchanged, answer.schedule]
         certified = sorted((certifier.best(sequencer, it) for it in schedules), key=lambda it: it.steps)
         best, refined = certified[0], instance
         if is_refined:
             best, refined = self._refinement.shortened(best, sequencer)
         bound = answer.bound
-        if bound is not None and (shorter := least_transfer(refined)) < least:
-            bound = solve_blocks(refined, least=shorter, effort=self._effort, hint=best.schedule).bound
+        if bound is not None and refined is not instance:
+            finer = best_blocks(refined, least=least_transfer(refined), effort=self._effort, hint=best.schedule)
+            bound = min(bound, finer.bound or 0)
         return PlannedBlocks(
             sequenced=best,
             bound=bound,
@@ -145,7 +146,7 @@ class AssignmentSearch:
         schedule = improved(instance, greedy_schedule(instance))
         if not is_installed():
             return BlockAnswer(schedule=schedule, bound=None, is_proved=False)
-        return solve_blocks(instance, least=least_transfer(instance), effort=self._effort, hint=schedule)
+        return best_blocks(instance, least=least_transfer(instance), effort=self._effort, hint=schedule)
 
     def without(self, instance: Instance, robot: str) -> float | None:
         """Cycle in [s] by the model if a robot did no task; None where a task is its alone."""
@@ -160,7 +161,7 @@ class AssignmentSearch:
             return None
         if is_installed():
             least = least_transfer(instance)
-            schedule = solve_blocks(instance, least=least, effort=LITTLE, hint=schedule).schedule or schedule
+            schedule = best_blocks(instance, least=least, effort=LITTLE, hint=schedule).schedule or schedule
         sequencer = Sequencer(instance, refusals=self._refusals)
         settled = self._refinement.certifier.settle(sequencer, sequencer.ordered(schedule).schedule)
         return settled.steps * instance.step

@@ -10,6 +10,7 @@ WORKERS: Final = 8  # searches that take turns; their number decides the answer,
 POOL: Final = 24  # answers that are known at the end
 ROUNDING: Final = 1e-6  # [steps] of a bound
 LISTENING: Final = 0.5  # [s] from one look for the end of a search to the next; it ends no search
+TOLERANCE: Final = 1e-3  # [steps] of a linear model's bound
 
 
 def is_installed() -> bool:
@@ -27,6 +28,32 @@ def new_model() -> Any:
     from ortools.sat.python import cp_model
 
     return cp_model.CpModel()
+
+
+def new_relaxation() -> Any:
+    """An empty linear model."""
+    from ortools.linear_solver.python import model_builder
+
+    model: Any = model_builder.Model
+    return model()
+
+
+class Relaxed:
+    """A linear model, solved to its end.
+
+    Attributes:
+        bound: No answer has a smaller objective.
+        reduced: By how much the objective is larger at least where a variable is one, for each of them.
+    """
+
+    def __init__(self, model: Any, variables: Sequence[Any]) -> None:
+        """Solve a model."""
+        from ortools.linear_solver.python import model_builder
+
+        solver = model_builder.Solver("glop")
+        solver.solve(model)
+        self.bound = float(solver.objective_value) - TOLERANCE
+        self.reduced = [float(solver.reduced_cost(it)) for it in variables]
 
 
 class Solved:
@@ -52,6 +79,7 @@ class Solved:
         parameters = self._solver.parameters
         parameters.num_workers, parameters.interleave_search, parameters.random_seed = WORKERS, True, 1
         parameters.max_deterministic_time = effort
+        parameters.cp_model_probing_level = parameters.symmetry_level = 0  # they take longer than they save
         parameters.fill_additional_solutions_in_response, parameters.solution_pool_size = True, POOL
         parameters.catch_sigint_signal = False  # the solver would stop early and the command go on
         with ThreadPoolExecutor(1) as thread:
