@@ -32,13 +32,7 @@ PlacedCheck = tuple[int, Check]  # number of a phase, and a check at a time of i
 
 
 def with_task_rules(cell: Cell, phases: Sequence[JudgedPhase], reports: Sequence[Report]) -> list[Report]:
-    """The reports of the phases of one cycle with the checks of the rules, each where the later task begins.
-
-    Args:
-        cell: The cell of the whole program.
-        phases: The phases in their order.
-        reports: The report of each of them.
-    """
+    """The reports of the phases of one cycle with the checks of the rules, each where the later task begins."""
     checks: dict[int, list[Check]] = {}
     for place, check in check_task_rules(cell, phases):
         checks.setdefault(place, []).append(check)

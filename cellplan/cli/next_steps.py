@@ -15,11 +15,7 @@ OPTIONS: Final = {"motion.duration_s": "--duration", "checks.clearance_mm": "--c
 
 
 def after_check(cell: Path, checked: Cell, *, passed: bool, allow_dirs: Sequence[Path] = ()) -> list[str]:
-    """What to type after a check.
-
-    Args:
-        cell: The cell file, as the user named it.
-    """
+    """What to type after a check."""
     if passed:
         return [_line("solve", str(cell), *_settings(checked.origin.changes), *_folders(allow_dirs))]
     return list(_repair(cell, checked, allow_dirs))

@@ -53,8 +53,6 @@ def alternate(
 
     Args:
         request: What is searched for; its cell has open tasks.
-        folder: The folder of all steps.
-        stop: Where each layout search ends.
         workers: Processes that search layouts.
 
     Raises:

@@ -58,7 +58,6 @@ def swept_area(scene: Scene, q: Array) -> dict[str, Any]:
     """What the links and tools of each robot cover from above, as rows of squares.
 
     Args:
-        scene: The cell made computable.
         q: Configurations of its motion in [rad] or [m], shape (N, nq).
 
     Returns:

@@ -23,8 +23,6 @@ def solved_outcome(
     """Solve one variant; what is wrong with it becomes its reason.
 
     Args:
-        read: Gives the cell of the variant.
-        figures: Key figures of its solution.
         file: The cell file; reasons name it without its folder.
         task: Name of the only task to work on; None for all.
         folder: Run folder to be written; None for none.

@@ -72,9 +72,7 @@ def solve_motion(
     """All phases, verified but for their clearance, and the scene of the solved cell; see ``solve``.
 
     Args:
-        task: Name of the only task to work on.
         near: Folder of a run of which the branches are kept.
-        progress: Called with the stage and the fraction done.
         early: Begins with the clearance of each phase as soon as its rows are known.
     """
     refuse_clock_name(cell)
@@ -141,9 +139,7 @@ def certified(
     """The solution with the clearance of every phase checked and the verdict in the headers of its tables.
 
     Args:
-        solution: The solution of ``solve_motion``.
         is_reported: See ``solve``; never of a clearance without the curves of a report.
-        progress: Called with the stage and the fraction done.
         early: Has the clearance.
     """
     phases = []
@@ -214,9 +210,6 @@ def with_verdict(
     """The same rows under headers that carry the verdict, the digests, a remark, and what is left out.
 
     Args:
-        program: The tables as text.
-        phases: The phases of the program.
-        reports: The report of each of them.
         remark: What else has to be known of the rows.
     """
     names = [f"{phase.name}: " if len(phases) > 1 else "" for phase in phases]
@@ -245,9 +238,7 @@ def solve_in_parallel(
 
     Args:
         cell: The cell, as ``load_cell`` gives it.
-        task: Name of the only task to work on.
         near: Folder of a run of which the branches are kept.
-        progress: Called with the stage and the fraction done.
     """
     with ForkedWork(progress) as work:
         if not work.is_possible:

@@ -121,12 +121,7 @@ def _write_pages(
     plots: Mapping[str, Mapping[str, bytes]],
     tables: Collection[str],
 ) -> None:
-    """Report, drawings and page of each phase in its subfolder, and those of the program above them.
-
-    Args:
-        plots: Plots of each phase by its place.
-        tables: Names of the joint tables in the run folder.
-    """
+    """Report, drawings and page of each phase in its subfolder, and those of the program above them."""
     for name, drawings in drawings_by_place(solution.cell, solution.runs).items():
         place, record = PurePosixPath(name), records.by_place[name]
         target.write_text(str(place / "report.json"), as_json(record))

@@ -41,7 +41,6 @@ class Bundle:
         """The files that cells are read from, and the whole of some run folders.
 
         Args:
-            cells: Each cell with its file.
             allow_dirs: Folders that the files may lie in, beside those of the cells and of the user.
         """
         paths = [path for run in runs for path in sorted(run.rglob("*")) if path.is_file()]

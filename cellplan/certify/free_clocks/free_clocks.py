@@ -97,7 +97,6 @@ def band(
     Args:
         times: Times of the rows in [s], shape (N,).
         low: Smallest difference in [s].
-        high: Largest one.
         first: Both times are no less than this.
         last: Both times are no more than this.
         parts: Rectangles across the band.

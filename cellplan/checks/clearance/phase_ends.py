@@ -95,7 +95,6 @@ def with_phase_ends(cell: Cell, phases: Sequence[JudgedPhase]) -> list[Report]:
 
     Args:
         cell: The cell of the whole program; reports of any other program stay as they are.
-        phases: Phases of one cycle in their order.
     """
     reports = [phase.report for phase in phases]
     if not cell.program.is_home_to_home or any(report.skew is None for report in reports):

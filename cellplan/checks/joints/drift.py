@@ -56,7 +56,6 @@ def check_joint_drift(repeatability: Repeatability | None, *, is_demanded: bool)
 
     Args:
         repeatability: Drift of the run; a run without a cycle cannot meet the demand.
-        is_demanded: Whether the cell demands a closed joint motion.
     """
     if not is_demanded:
         return ()

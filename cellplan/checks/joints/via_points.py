@@ -14,12 +14,7 @@ PASSED: Final = 1e-9  # [rad] or [m] within which a configuration is passed: rou
 
 
 def with_via_points(cell: Cell, reports: Sequence[Report]) -> list[Report]:
-    """The reports of the phases of one cycle with the checks of their via points.
-
-    Args:
-        cell: The cell of the whole program.
-        reports: Reports in the order of the phases.
-    """
+    """The reports of the phases of one cycle with the checks of their via points."""
     checks = (_checks(cell, reports, place) for place in range(len(reports)))
     return [replace(report, checks=(*report.checks, *more)) for report, more in zip(reports, checks, strict=True)]
 

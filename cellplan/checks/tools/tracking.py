@@ -50,7 +50,6 @@ def worst_error(name: str, times: Array, error: Array, *, subject: str, limit: f
     Args:
         times: Times in [s] at which it is judged, shape (N,).
         error: Lengths of the error in the unit of the limit, shape (N,).
-        subject: Task or robot that is judged.
         words: Unit, and whose error it is.
     """
     worst = int(np.argmax(error))

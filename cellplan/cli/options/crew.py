@@ -18,10 +18,7 @@ def crew(
     """A number of processes, or the executor of a cluster, for a ``with`` statement.
 
     Args:
-        workers: The option ``--workers``.
-        scheduler: The option ``--scheduler``.
         files: Gives the files that the trials read, for a cluster.
-        keep_runs: Whether trials write folders of their own.
 
     Raises:
         InputError: The options contradict each other, or there is no such cluster.

@@ -141,7 +141,6 @@ def screen_text(lines: Sequence[str], *, passed: bool | None, width: int) -> str
 
     Args:
         passed: The verdict; None for a result that neither passes nor fails.
-        width: Columns of the terminal.
     """
     from rich.console import Console
     from rich.text import Text

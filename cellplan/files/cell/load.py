@@ -121,8 +121,6 @@ def load_open_cell(
     """Read a cell in which tasks may be open to several robots, for a search that chooses one of them.
 
     Args:
-        path: The cell file.
-        allow_dirs: As for ``load_cell``.
         values: Values in place of those of the file, by address; see ``Cell.with_values``.
 
     Returns:
@@ -158,11 +156,7 @@ def with_names(cell: Cell, file: Path) -> Cell:
 
 
 def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:
-    """The cell of a document, after all rules were applied to it and to the files that it names.
-
-    Args:
-        known: Findings that are known already.
-    """
+    """The cell of a document, after all rules were applied to it and to the files that it names."""
     document, file = with_first_robots(source.document), source.document.file
     valid, findings = read_valid_entries(document)
     findings += [*document.findings, *open_task_findings(source.document), *known]

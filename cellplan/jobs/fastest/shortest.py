@@ -176,9 +176,6 @@ def production_curve(
 
     Every point is a program that was planned anew, written and read back. Its clearance is not certified again: all
     points of a law run along one joint path, and that of the shortest one is.
-
-    Args:
-        points: Number of calmer cycles of each law.
     """
     factors = [LONGEST ** ((k + 1) / points) for k in range(points)]
     sought = [(program.law, _values(base, program, factor)) for program, factor in product(shortest, factors)]

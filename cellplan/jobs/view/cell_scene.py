@@ -58,11 +58,7 @@ def _further(failures: Iterable[tuple[str, str]], record: Record) -> Iterator[Re
 
 
 def blocked_scene(blocked: BlockedTry, what: str, geometries: Geometries) -> Record:
-    """The scene of the best try of a transfer move that was not found, in nominal time.
-
-    Args:
-        what: What is in its way, in words.
-    """
+    """The scene of the best try of a transfer move that was not found, in nominal time."""
     q, names = blocked.tried.q, [body.name for body in blocked.scene.bodies]
     times: Array = TRY_STEP * np.arange(len(q), dtype=np.float64)
     at = float(times[blocked.row])

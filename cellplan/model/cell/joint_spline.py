@@ -35,8 +35,6 @@ class JointSpline:
         Args:
             shares: Shares of the clock, increasing from 0 to 1, shape (N,), at least as many as there are coefficients.
             q: Configurations in [rad] or [m], shape (N, n).
-            count: Number of coefficients.
-            degree: Degree of the polynomials.
         """
         values = basis(shares, count, degree)
         ends = values[:, [0, -1]] @ q[[0, -1]]

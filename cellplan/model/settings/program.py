@@ -197,12 +197,7 @@ class ProgramEntry(Entry):
         return 0.0 if self.apart_mm is None else self.apart_mm.si
 
     def in_order(self, tacks: Collection[str], tasks: Iterable[str]) -> Iterator[tuple[str, str, str]]:
-        """Tasks of which the first is done before the second begins, with the key that says so.
-
-        Args:
-            tacks: Names of the tasks that are tacks.
-            tasks: Names of all tasks.
-        """
+        """Tasks of which the first is done before the second begins, with the key that says so."""
         turns = [it for names in zip_longest(*(self.order.alternate if self.order else ())) for it in names if it]
         yield from ((first, second, "order.alternate") for first, second in pairwise(turns))
         if self.tacks_first:

@@ -72,7 +72,6 @@ def stretches(path: JointPath, top_speeds: Array) -> list[PathStretch]:
     A corner that the path passes at speed ends a stretch as well: joints can pass it at rest only.
 
     Args:
-        path: The path over the nominal time.
         top_speeds: Largest speeds of the joints in [rad/s] or [m/s], shape (nq,).
     """
     scale = 1.0 / top_speeds

@@ -13,7 +13,6 @@ def nearest_to_singular(problem: TrackingProblem, k: int, q: Array) -> NearestSi
     Joints that move nothing are left out; so are robots that cannot move. Units are mixed: metres and radians.
 
     Args:
-        k: Sample.
         q: Stacked configuration, shape (nq,), in [rad] or [m].
 
     Returns:

@@ -104,7 +104,6 @@ def report_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes], **pic
     """The page of a program, or of one of its phases; that of several phases leads to the page of each.
 
     Args:
-        record: Its ``report.json``.
         plots: SVG pictures by file name, which lie in ``plots/`` beside the page; others are ignored.
         **pictures: What lies beside it, and its pictures.
     """
@@ -156,9 +155,6 @@ def cell_page(name: str, record: Record, cell: Cell, parts: Mapping[str, object]
     """The page of something that was done with a cell.
 
     Args:
-        name: File name of its template.
-        record: What the template shows.
-        cell: The cell.
         parts: What else it shows, by the names in the template.
     """
     texts = {

@@ -13,7 +13,6 @@ def unmade_view_page(cell: str, *, cell_file: str) -> str:
     """What stands in a run folder in place of its 3-D page until that is made: the line that makes it.
 
     Args:
-        cell: Name of the cell.
         cell_file: Name of its cell file where that line must name it; empty otherwise.
     """
     return template("unmade.html").render(cell=cell, cell_file=cell_file, mark=MARK)

@@ -18,7 +18,6 @@ def watch_page(title: str, *, pages: Sequence[tuple[str, str]], state: str) -> s
     """The page as text.
 
     Args:
-        title: What is watched.
         pages: Titles and file names of the pages of a run.
         state: File name of the script that ``state_script`` returns.
     """

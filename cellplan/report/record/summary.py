@@ -74,7 +74,6 @@ def program_records(
     """The records of a program of one or several phases.
 
     Args:
-        cell: The cell of the whole program.
         planning: What only the planner of each phase knows; empty if it is not available.
     """
     records = {

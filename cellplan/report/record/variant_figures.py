@@ -82,7 +82,6 @@ def variant_curves(record: Record, phases: Sequence[Record], clearance: tuple[Ar
 
     Args:
         record: The ``report.json`` of the program: the limits of all joints.
-        phases: The ``series.json`` of each phase.
         clearance: Times in [s] and smallest distances of all bodies in [m], shape (K,) each; None if not known.
     """
     ratios_of_robots: dict[str, list[Array]] = {robot: [] for robot in record["joints"]}

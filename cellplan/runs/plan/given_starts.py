@@ -21,7 +21,6 @@ def with_placed_starts(
 
     Args:
         cell: The cell as it is while its tasks are worked on.
-        chains: Kinematic chain of each robot, by name.
         near: The run of which the branches are kept, where starts are missing.
 
     Raises:

@@ -42,9 +42,6 @@ def work_phases(cell: Cell, robot: str, progress: Progress = silent) -> Iterator
     Where a robot, which may stand elsewhere, cannot begin its task, the others begin without it, and it is where it was
     or mid-range.
 
-    Args:
-        robot: The name of that robot.
-
     Raises:
         NoSolutionError: The others cannot begin their tasks.
     """

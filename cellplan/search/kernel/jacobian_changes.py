@@ -14,7 +14,6 @@ class JacobianChanges:
         """Note the screws and how fast their axes move.
 
         Args:
-            screws: The screws at all nodes.
             local: Rates of the own axes of each relation, shape (N, T, levels).
             shared: Rates of the axes of the positioner, shape (N, levels).
             at_tips: Whether all twists are taken at the tips.

@@ -180,7 +180,6 @@ def robust_layout(
     Args:
         begin: Variables, shape (n,), and start posture, shape (nq,).
         signs: Seeded corners, each displacement -1 or 1, shape (C, m).
-        rounds: Number of rounds at most.
     """
     (x, start), best = begin, None
     for _ in range(rounds):
