@@ -123,7 +123,7 @@ def mirrored_goals(draft: AssignmentDraft, goals: Sequence[TaskGoal]) -> list[Ta
 
 
 def goals_with_other_starts(draft: AssignmentDraft, goals: Sequence[TaskGoal]) -> list[TaskGoal]:
-    """Tasks along circles, rectangles and rhombi without a given start, from each of their other starts.
+    """Tasks along circles, rectangles and rhombi without a given start, and closed polylines, from their other starts.
 
     There are none where arcs have to keep a distance, which is known for the paths as they are written.
     """
@@ -145,9 +145,17 @@ def goals_with_other_starts(draft: AssignmentDraft, goals: Sequence[TaskGoal]) -
 
 
 def _starts(cell: Cell, task: str) -> list[tuple[str, object]]:
-    """Addresses and values of the starts of a path beside its own: 45 deg apart on a circle, else its corners."""
+    """Addresses and values of the starts of a path beside its own: 45 deg apart on a circle, else its corners.
+
+    A polyline with rounded corners has none: it would be rounded where it began, and not where it begins.
+    """
     tasks: Any = cell.origin.document["tasks"]
     path, place = tasks[task]["path"], f"tasks.{task}.path"
+    points = written_points(cell, task)
+    if points is not None and path["polyline"].get("closed") and cell.task(task).blend is None:
+        step = -(-len(points) // len(ANGLES))  # no more starts than a circle has
+        turned = ((*points[first:], *points[:first]) for first in range(step, len(points), step))
+        return [(f"{place}.polyline.points_mm", it) for it in turned]
     shape = next((name for name in CORNERS if path.get(name) is not None), None)
     if shape is None or f"{place}.{shape}.start_at" in cell.origin.lines:
         return []

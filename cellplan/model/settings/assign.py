@@ -39,7 +39,8 @@ class AssignEntry(Entry):
         default=("direction", "start", "spin", "station"),
         description="What may be chosen anew for every task: the direction of an open polyline whose tool stands "
         "across it, or is mirrored across it for the way back, the start of a circle, rectangle or rhombus without "
-        "start_at, the turn of the tool about its axis, the pose of the part.",
+        "start_at, and of a closed polyline without rounded corners, the turn of the tool about its axis, the pose of "
+        "the part.",
     )
     spin_step_deg: Annotated[Deg, Within(ge=5.0, le=360.0)] = Field(
         default=Deg(60.0), description="Step of the turns of the tool about its axis that are compared."

@@ -57,6 +57,21 @@ def test_a_rectangle_begins_at_its_corners(tmp_path: Path) -> None:
     assert corners == {(x, y, 0.0) for x in (-0.06, 0.06) for y in (-0.04, 0.04)}
 
 
+def test_a_closed_polyline_begins_at_its_corners_and_stays_the_same(tmp_path: Path) -> None:
+    shape = "path: {polyline: {closed: true, points_mm: [[-300, -150, 40], [-160, -150, 40], [-200, -60, 40]]}}"
+    every = starts(draft(tmp_path, shape))
+
+    corners = {tuple(np.round(1e3 * goal.X_PT[1, :3, 3], 6) + 0.0) for goal in every}
+    assert corners == {(-300.0, -150.0, 40.0), (-160.0, -150.0, 40.0), (-200.0, -60.0, 40.0)}
+    for goal in every:
+        points = goal.X_PT[1:-1, :3, 3]
+        assert np.abs(points[-1] - points[0]).max() < 1e-9
+        assert np.all(np.cross(np.diff(points, axis=0)[:-1], np.diff(points, axis=0)[1:])[:, 2] > -1e-12)
+        assert goal.steps == every[0].steps
+    rounded = shape + "\n    corners: {blend_mm: 5}"
+    assert starts(draft(tmp_path, rounded)) == []
+
+
 def test_a_start_that_is_given_or_not_free_stays(tmp_path: Path) -> None:
     given = CIRCLE.replace("radius_mm: 60", "radius_mm: 60, start_at: +y")
 
