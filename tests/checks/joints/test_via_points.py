@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from cellplan.checks.joints.via_points import with_via_points
-from cellplan.errors import InputError, TransferNotFoundError
+from cellplan.errors import InputError
 from cellplan.files.cell.load import load_cell
 from cellplan.files.cell.write import render_cell
 from cellplan.geometry.arrays import Array
-from cellplan.jobs.assign.draft import refuse_unless_assignable
 from cellplan.model.cell.cell import Cell
 from cellplan.runs.solution import Solution
 from cellplan.runs.solve import solve
@@ -91,7 +90,7 @@ def test_a_table_that_leaves_a_via_point_out_or_passes_it_too_late_fails(solutio
     assert not check_of(backwards).passed
 
 
-def test_the_resolved_cell_has_them_and_an_assignment_refuses_them(tmp_path: Path) -> None:
+def test_the_resolved_cell_has_them(tmp_path: Path) -> None:
     cell = with_via()
     again = tmp_path / "again.yaml"
     again.write_text(render_cell(cell), encoding="utf-8")
@@ -104,14 +103,10 @@ def test_the_resolved_cell_has_them_and_an_assignment_refuses_them(tmp_path: Pat
         None,
         np.radians(OUT).tolist(),
     ]
-    with pytest.raises(InputError, match=r"tasks\.circle\.via: unexpected key, as an assignment reckons with straight"):
-        refuse_unless_assignable(cell)
 
 
-def test_a_via_point_that_collides_is_named_by_its_leg() -> None:
-    into_floor = [0, 30, 100, 0, -45, -180]
+def test_a_via_point_in_which_the_robot_touches_itself_is_refused_at_its_key() -> None:
+    folded = [0, 30, 100, 0, -45, -180]
 
-    with pytest.raises(TransferNotFoundError) as refused:
-        solve(with_via(**{"tasks.circle.via": {"before": [BACK, into_floor]}}), is_reported=False)
-
-    assert "transfer-1, from home to work-1 (circle): leg 2 of 3 over its via points: the goal" in str(refused.value)
+    with pytest.raises(InputError, match=r"tasks\.circle\.via\.before\[1\]: 'kuka' comes too close there: 'kuka/"):
+        solve(with_via(**{"tasks.circle.via": {"before": [BACK, folded]}}), is_reported=False)
