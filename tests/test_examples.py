@@ -54,7 +54,14 @@ WRITTEN = {
     "solve": ["outputs/examples/solve/report.html", "outputs/examples/solve/tables/right.csv"],
 }
 PROCESSES = ("gallery/layout_result", "gallery/sweep_into_frame", "layout")
-OTHERS = ("batch_of_cells", "rehearse", "gallery/clearance_over_time", "gallery/solve_and_plot")  # solve as others do
+OTHERS = (  # solve as others do
+    "batch_of_cells",
+    "rehearse",
+    "verify_edited_table",
+    "gallery/clearance_over_time",
+    "gallery/solve_and_plot",
+    "gallery/worst_moments",
+)
 MARKS = dict.fromkeys((*PROCESSES, *OTHERS), pytest.mark.slow)
 
 

@@ -357,6 +357,7 @@ def test_a_method_and_a_check_that_follow_their_recipes_are_in_the_report(extend
     assert 0.5 < travel[0]["value"] < 10.0
 
 
+@pytest.mark.slow
 def test_a_format_that_follows_its_recipe_is_written_after_all_checks(extended: Path) -> None:
     run(extended, "export", "run", "--cell", "plate.yaml", "--format", "semicolons", "-o", "programs")
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cellplan import load_cell, solve
 from cellplan.runs.solution import Run, Solution
 
-pytestmark = pytest.mark.usefixtures("stored_solutions")
+pytestmark = [pytest.mark.usefixtures("stored_solutions"), pytest.mark.slow]
 
 Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parent.parent.parent

@@ -33,6 +33,9 @@ MEANT_TO_FAIL = {"four_robots_initial", "find_a_layout"}  # the starts of layout
 # The first two are programs of 23 s; `multimove` searches starts of three robots, `mesh_part_csv` certifies a mesh,
 # `load_sharing` has a planar twin; the others are templates, of which the quick tests solve the first.
 LONG = {
+    "dual_arm",
+    "rail",
+    "load_sharing_planar",
     "three_tasks_each",
     "in_turn",
     "fixed_part",

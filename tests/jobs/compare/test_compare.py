@@ -89,6 +89,7 @@ def test_a_run_has_the_figures_of_its_cell_and_says_that_its_proof_was_not_made_
     assert mixed["sentences"][-1].startswith("run was not verified again: ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["simultaneous", "pairwise"])
 def test_figures_from_records_are_those_from_reports(place: Path, modes: dict[str, Any], mode: str) -> None:
     """A second derivation of the key figures that a sweep has."""

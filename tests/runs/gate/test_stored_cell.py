@@ -301,6 +301,7 @@ def test_the_wiring_of_other_names_is_checked_before_anything_is_verified(
     assert not (tmp_path / "rapid").exists()
 
 
+@pytest.mark.slow
 def test_programs_with_other_names_are_written_and_verified(
     solved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -122,6 +122,7 @@ def test_scenarios_have_the_derivatives_of_their_differences(pair: SimpleNamespa
         np.testing.assert_allclose(derivatives @ unit, differences, atol=5e-3 * np.abs(differences).max())
 
 
+@pytest.mark.slow
 def test_a_robust_layout_keeps_its_demands_in_all_corners(pair: SimpleNamespace) -> None:
     search = RobustSearch(
         problem=guarded(pair.ready.problem(33)),
@@ -157,6 +158,7 @@ def test_a_corner_moves_as_the_product_solves_it(pair: SimpleNamespace) -> None:
     assert corner.cycle == pytest.approx(2.0 * ratio, rel=0.01)
 
 
+@pytest.mark.slow
 def test_tolerances_are_where_a_demand_is_missed(pair: SimpleNamespace) -> None:
     effort = Effort(keys=5, within=0.003)
     nominal = Measures.of(pair.problem, pair.point, pair.demands, effort)

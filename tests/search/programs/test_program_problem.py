@@ -12,6 +12,8 @@ from cellplan.search.programs.objective import CycleTiming, Demands, Effort, Obj
 from cellplan.search.programs.program_problem import ProgramProblem
 from cellplan.search.programs.rows import Linear
 
+pytestmark = pytest.mark.slow  # phases of programs stand in quick tests of layouts and of misplaced bases
+
 CELL = Path(__file__).resolve().parents[3] / "cells" / "three_tasks_each.yaml"
 STEP = 1e-4  # [-] usual steps of the differences
 AWAY = 0.02  # [-] usual steps from the given layout, whose numbers are round
@@ -111,7 +113,6 @@ def test_rows_are_the_derivatives_of_what_is_measured(
         assert np.quantile(errors, 0.9) <= 0.02 * np.abs(seen[is_seen]).max()
 
 
-@pytest.mark.slow
 def test_times_of_transfers_have_their_derivatives(ready: PreparedSearch, problem: ProgramProblem) -> None:
     point = problem.evaluate(_away(ready, problem), ready.given_start)
     assert point is not None
