@@ -1,11 +1,9 @@
 """Recording of a study while it runs: each trial in its place, the best so far, and what is said about it."""
 
-import signal
-import threading
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 
 from cellplan.model.progress import Progress
+from cellplan.study.interruptions import deferred_interruptions
 from cellplan.study.journal import Journal
 from cellplan.study.running import RunningState, seconds_since
 from cellplan.study.status import Best, StudyStatus
@@ -66,7 +64,7 @@ class Recorder:
             self._append(trial, again)
             self.follow(again)
         else:
-            with _deferred_interruptions():
+            with deferred_interruptions():
                 self.journal.park(trial)
         self._report()
 
@@ -84,7 +82,7 @@ class Recorder:
     def _append(self, trial: StudyTrial, again: Again | None) -> None:
         if again is not None and self._counts(trial):
             trial = StudyTrial(variant=trial.variant, outcome=again(trial.variant))
-        with _deferred_interruptions():
+        with deferred_interruptions():
             self.journal.append(trial)
         self._count(trial)
 
@@ -106,27 +104,3 @@ class Recorder:
         if state.budget:
             shares.append(self.seconds / state.budget)
         self._progress(status.text(self._noun), min(1.0, max(shares, default=0.0)))
-
-
-@contextmanager
-def _deferred_interruptions() -> Iterator[None]:
-    """Let Ctrl-C and its like wait for the end of the ``with`` statement: half a line is none."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    caught: list[int] = []
-    numbers = [
-        number
-        for name in ("SIGINT", "SIGTERM", "SIGHUP")
-        if (number := getattr(signal, name, None)) is not None
-        and signal.getsignal(number) is signal.default_int_handler
-    ]
-    try:
-        for number in numbers:
-            signal.signal(number, lambda caught_number, _frame: caught.append(caught_number))
-        yield
-    finally:
-        for number in numbers:
-            signal.signal(number, signal.default_int_handler)
-        if caught:
-            raise KeyboardInterrupt

@@ -3,11 +3,12 @@
 import json
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from typing import Final
 
 from cellplan.errors import StudyStoppedError
+from cellplan.study.interruptions import deferred_interruptions, is_one_done, result_of
 from cellplan.study.trial import TrialOutcome, Variant
 from cellplan.study.workers import Evaluate, Limits, Lost, Workers, crashed, outcome_in_child, packed
 
@@ -41,8 +42,9 @@ class Flight:
         self._waiting.extend(variants)
         longest = self._limits.longest
         while self._waiting or self._lost or self._flying:
-            self._fill()
-            if not wait(self._flying, timeout=longest, return_when=FIRST_COMPLETED).done:
+            with deferred_interruptions():
+                self._fill()
+            if not is_one_done(self._flying, longest):
                 raise StudyStoppedError(
                     f"no trial has ended for {longest:g} s, longer than one may take: what works them out does not "
                     "answer; --resume goes on from what is recorded"
@@ -51,9 +53,10 @@ class Flight:
 
     def ended(self) -> Iterator[tuple[Variant, TrialOutcome]]:
         """Those whose outcomes have come, without waiting for others."""
-        done = [future for future in self._flying if future.done()]
+        with deferred_interruptions():
+            done = [future for future in self._flying if future.done()]
         for future in sorted(done, key=lambda future: self._flying[future].number):
-            outcome = self._outcome(self._flying[future], future.result(timeout=0))
+            outcome = self._outcome(self._flying[future], result_of(future, 0.0))
             if outcome is not None:
                 yield self._flying[future], outcome
             del self._flying[future]

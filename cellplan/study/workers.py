@@ -17,6 +17,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 from cellplan.errors import CellplanError, NotFiniteError, OverrunError, StudyStoppedError, TimeLimitError
 from cellplan.guard import ChildStock, Guard
 from cellplan.study.bundle import Unpacked, packed_with_paths, reading_below
+from cellplan.study.interruptions import result_of
 from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 ADDRESS: Final = re.compile(r" at 0x[0-9a-fA-F]+")  # of an object in an error text: another one in each process
@@ -86,8 +87,7 @@ class Workers(ThreadPoolExecutor):
 
         def value() -> Value:
             with suppress(CellplanError, TypeError, AttributeError, pickle.PicklingError, TimeoutError):
-                value: Value = begun.result(timeout=LONGEST_S)
-                return value
+                return result_of(begun, LONGEST_S)
             return function(*arguments)
 
         return value
@@ -95,7 +95,7 @@ class Workers(ThreadPoolExecutor):
     def attempt(self, function: Callable[..., object], *arguments: object) -> None:
         """Do ``function(*arguments)`` in one of the processes, which it may end: what goes wrong is ignored."""
         with suppress(CellplanError, TimeoutError):
-            self.submit(_called, function, arguments).result(timeout=LONGEST_S)
+            result_of(self.submit(_called, function, arguments), LONGEST_S)
 
     def stop(self) -> None:
         """End the processes of trials under way: nothing is asked of these any more."""
