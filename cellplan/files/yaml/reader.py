@@ -21,6 +21,7 @@ NODE_LIMIT: Final = 200_000
 DEPTH_LIMIT: Final = 32
 KEY_LENGTH_LIMIT: Final = 100  # [characters] no key of a cell comes near
 FORBIDDEN_IN_KEYS: Final = frozenset("<>")  # no name has them; the schema marks its choices with them
+WORDS_AS_KEYS: Final = frozenset({"on", "off"})  # of a process; a key is never a truth value
 
 # Everything that is not printable text: it could hide words from the reader or shift the line numbers.
 CONTROL_CHARACTERS: Final = re.compile(
@@ -280,7 +281,7 @@ class _Composer:
         if match := CONTROL_CHARACTERS.search(event.value):
             refuse(event, path, f"expected printable text, got control character U+{ord(match[0]):04X}")
             return UNREADABLE
-        if not event.implicit[0]:
+        if not event.implicit[0] or (is_key and event.value in WORDS_AS_KEYS):
             return event.value
         try:
             return plain_value(event.value)

@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.model.settings.acceleration import CycleTime
 from cellplan.model.settings.entry import Angle, Coordinate, Entry, Name, PoseEntry, Text, by_kind, rule
+from cellplan.model.settings.process_statements import ProcessStatementsEntry, require_process
 from cellplan.model.settings.units import Ms, Within
 
 LARGEST_FACTOR: Final = 1_000.0  # [-] a larger coupling is a mistake
@@ -82,7 +83,7 @@ KindName = Literal["abb", "fanuc", "kuka", "reis", "ros", "staubli", "ur", "yask
 class ControllerEntry(Entry):
     """A controller of the cell; robots on different controllers share no clock."""
 
-    NAMES: ClassVar[Set[str]] = frozenset({"tasks"})  # keys that no proof depends on
+    NAMES: ClassVar[Set[str]] = frozenset({"tasks", "process"})  # keys that no proof depends on
     kind: KindName = Field(description="Maker of the controller, or what drives the robot.")
     tasks: dict[Identifier, Identifier] = Field(
         default={},
@@ -103,6 +104,16 @@ class ControllerEntry(Entry):
     brake_s: Annotated[float, Field(ge=0.0, le=LONGEST_BRAKE_S)] | None = Field(
         default=None, description="Time in which its robots then brake on their path; absent: not stated."
     )
+    process: ProcessStatementsEntry | None = Field(
+        default=None, description="How its programs begin and end a process; absent: not stated."
+    )
+
+    @model_validator(mode="after")
+    def _has_process_of_its_kind(self) -> Self:
+        """Process statements are those of the maker."""
+        if self.process is not None:
+            require_process(self.process, self.kind)
+        return self
 
     @model_validator(mode="after")
     def _has_tasks_of_abb_only(self) -> Self:

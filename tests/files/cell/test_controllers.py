@@ -367,3 +367,31 @@ def test_a_demand_on_stops_needs_to_know_how_others_go_on(connected: Load) -> No
 def test_a_demand_on_stops_needs_a_controller(load: Load) -> None:
     with pytest.raises(InvalidFileError, match=r"checks\.stop: expected controllers of robots that state reaction_ms"):
         load(("part:\n", f"{STOP}part:\n"))
+
+
+def test_data_of_a_process_are_those_of_the_tasks_of_the_controller(connected: Load) -> None:
+    """A task that does not exist, and one without data."""
+    feed = ("    tool_axis: normal\n", "    tool_axis: normal\n    process: {feed_mm_s: 50}\n")
+    statements = 'on: "SetDO {data},1", off: "SetDO {data},0", data'
+
+    def load_with(data: str) -> Cell:
+        clock = ("motion: {duration_s: 4}\n", "motion: {step_s: 0.01}\n")
+        return connected(
+            feed, clock, (SECOND, SECOND.replace("ROB_1}}", f"ROB_1}}, process: {{{statements}: {data}}}}}"))
+        )
+
+    for data, finding in (
+        ("{rim: doA, ring: doB}", "controllers.c2.process.data.rim: expected a task of this cell (ring), got 'rim'"),
+        ("{}", "controllers.c2.process.data: missing, expected by task what stands in the slot {data}"),
+        ("{rim: doA}", "controllers.c2.process.data: expected data of the task 'ring' too, got none"),
+        ("{ring: 'doA,1; EXIT'}", "controllers.c2.process.data.ring: expected "),
+    ):
+        with pytest.raises(InvalidFileError) as refusal:
+            load_with(data)
+        assert f": {finding}" in str(refusal.value)
+    cell = load_with("{ring: doB}")
+    entry = cell.controllers["c2"].process
+    assert entry is not None
+    assert entry.data == {"ring": "doB"}
+    Path("written").write_text(render_cell(cell), encoding="utf-8")
+    assert load_cell("written").controllers == cell.controllers

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from cellplan.errors import InputError
 from cellplan.files.yaml.reader import parse_yaml, read_yaml
+from cellplan.files.yaml.writer import yaml_text
 
 
 def findings(text: str) -> list[str]:
@@ -93,8 +94,8 @@ def test_plain_values_mean_what_they_say(text: str, value: object) -> None:
         ("a: 1\n? [b]\n: 2", "f.yaml:2: expected a word as key, got something else"),
         ("a: 1\ntrue: 2", "f.yaml:2: expected a word as key, got true; put it in quotes"),
         (
-            "a: 1\noff: 2",
-            "f.yaml:2: 'off' can be read as a truth value; write true or false, or put it in quotes",
+            "a: 1\nOff: 2",
+            "f.yaml:2: 'Off' can be read as a truth value; write true or false, or put it in quotes",
         ),
         ('a: "\\x07"', "f.yaml:1: a: expected printable text, got control character U+0007"),
         ('a: "\\u202e"', "f.yaml:1: a: expected printable text, got control character U+202E"),
@@ -104,6 +105,11 @@ def test_plain_values_mean_what_they_say(text: str, value: object) -> None:
 )
 def test_what_could_mean_two_things_is_refused_where_it_stands(text: str, message: str) -> None:
     assert findings(text) == [message]
+
+
+def test_on_and_off_are_keys_and_no_values() -> None:
+    assert parse_yaml(b"on: {off: 1}", file="f.yaml").root == {"on": {"off": 1}}
+    assert parse_yaml(yaml_text({"on": {"off": "on"}}).encode(), file="f.yaml").root == {"on": {"off": "on"}}
 
 
 def test_an_alias_is_refused_and_the_rest_is_still_read() -> None:

@@ -19,9 +19,17 @@ from cellplan.model.settings.controllers import ControllerEntry, RobotControlEnt
 from cellplan.runs.gate.stored_cell import StoredCell, load_stored_cell
 
 LEFT, RIGHT, ABB, FANUC = "robots.left.controller", "robots.right.controller", "controllers.irc", "controllers.r30"
+GLUE = {"on": "SetDO doGlue,high", "off": "SetDO doGlue,low"}
 STATED: dict[str, Any] = {
     "controllers": {
-        "irc": {"kind": "abb", "tasks": {"T_ROB1": "ROB_1"}, "latency_ms": 20, "reaction_ms": 100, "brake_s": 0.4},
+        "irc": {
+            "kind": "abb",
+            "tasks": {"T_ROB1": "ROB_1"},
+            "process": GLUE,
+            "latency_ms": 20,
+            "reaction_ms": 100,
+            "brake_s": 0.4,
+        },
         "r30": {"kind": "fanuc", "latency_ms": 12, "skew_ms": 1},
     },
 }
@@ -37,6 +45,7 @@ CONTROLS: dict[str, dict[str, Any]] = {
 }
 NAMES: dict[str, Any] = {
     f"{ABB}.tasks": {"T_ROB1": "ROB_7"},
+    f"{ABB}.process.on": "SetDO doGlue,1",
     f"{LEFT}.decimals": 6,
     f"{LEFT}.tool_number": 3,
     f"{LEFT}.handshake.output": "doHere",
@@ -128,7 +137,7 @@ def test_every_key_is_a_name_or_bound() -> None:
     last = {address.split(".")[2 if address.startswith("controllers") else 3] for address in [*NAMES, *BOUND]}
 
     assert last | {"task", "id"} == of_controller | of_robot  # a task is renamed together with those of its controller
-    assert {"tasks"} == ControllerEntry.NAMES
+    assert {"tasks", "process"} == ControllerEntry.NAMES
     assert of_robot - RobotControlEntry.NAMES == {"id", "cycle_ms", "base", "tool_frame"}
 
 

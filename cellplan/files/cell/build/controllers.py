@@ -45,6 +45,7 @@ def control_findings(
             yield from _frames(path, control, entry, document)
             if name in models:
                 yield from _joints((*path, "id"), entry, models[name], document)
+    yield from _process_data(valid, document)
     yield from _without_robots(valid, document)
     yield from _stop(valid, document)
 
@@ -156,6 +157,30 @@ def _used_twice(path: KeyPath, control: RobotControlEntry, uses: Uses, document:
 def _article(noun: str) -> str:
     """A noun with its article."""
     return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
+
+
+def _process_data(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
+    """Data of a process are those of tasks of the cell, and every process of the controller's robots has some."""
+    for name, entry in valid.controllers.items():
+        if entry.process is None or not entry.process.data:
+            continue
+        path: KeyPath = ("controllers", name, "process", "data")
+        for named in entry.process.data:
+            if named not in valid.names["tasks"]:
+                text = unknown_name("a task of this cell", named, valid.names["tasks"])
+                yield document.key_finding((*path, named), text)
+        for task in _in_process(name, valid):
+            if task not in entry.process.data:
+                yield document.key_finding(path, f"expected data of the task '{task}' too, got none")
+
+
+def _in_process(controller: str, valid: ValidEntries) -> Iterator[str]:
+    """Tasks with a process of the robots of a controller; of a task that is open for several robots none is known."""
+    for name, task in valid.tasks.items():
+        robot = valid.robots.get(task.robot)
+        control = robot.controller if robot is not None else None
+        if task.process is not None and control is not None and control.id == controller:
+            yield name
 
 
 def _without_robots(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
