@@ -12,19 +12,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.errors import InputError
-from cellplan.geometry.transforms import Array, rotation_about
+from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.units import MM
 from cellplan.programs.elements.conventions import QUATERNION_DECIMALS, quaternions
-from cellplan.programs.elements.joints import Axes, from_numbers, to_numbers
+from cellplan.programs.elements.joints import Axes, to_numbers
 from cellplan.programs.elements.text import fixed
+from cellplan.programs.elements.wrist import sides_at_zero, wrist_sides
 from cellplan.programs.formats.rapid.units import ABSENT, EXTERNAL_AXES, RapidUnit
 
 QUARTER: Final = 90.0  # [deg]
-MEETING_TOL: Final = 1e-6  # [m] axes of a wrist that pass nearer than this to its centre meet there
-PARALLEL_TOL: Final = 1e-6  # [rad] angle by which axes may miss being parallel or square
-FORWARD_TOL: Final = 1e-3  # [m] an arm whose wrist is nearer than this to the plane of axis 1 is not stretched forward
 
 
 def joint_targets(unit: RapidUnit, q: Array) -> list[str]:
@@ -64,55 +61,11 @@ def configuration(robot: Robot, q: Array) -> NDArray[np.int_]:
 
     ``InputError`` unless the last six joints are those of an arm with a wrist of three axes that meet.
     """
-    arm = list(Axes.of(robot).arm)
-    zero = from_numbers(robot, np.zeros((1, len(robot.model.joints))))
-    at_zero, places = _wrist_sides(robot, arm, zero)[0], _wrist_sides(robot, arm, q)
-    if np.any(np.abs(at_zero) < FORWARD_TOL):
-        raise InputError(
-            f"robots.{robot.name}: expected an arm that is stretched forward at the zero of its controller, as its "
-            f"targets on the part state a configuration"
-        )
-    behind = places * np.sign(at_zero) < 0.0
-    numbers = to_numbers(robot, q, decimals=6)[:, arm]
+    behind = wrist_sides(robot, q) * np.sign(sides_at_zero(robot, both=True)) < 0.0
+    numbers = to_numbers(robot, q, decimals=6)[:, list(Axes.of(robot).arm)]
     quarters = np.floor(numbers[:, [0, 3, 5]] / QUARTER).astype(int)
     cfx = 4 * behind[:, 0] + 2 * behind[:, 1] + (numbers[:, 4] < 0.0)
     return np.column_stack([quarters, cfx])
-
-
-def _wrist_sides(robot: Robot, arm: list[int], q: Array) -> Array:
-    """Signed distances in [m] of the wrist from axis 1 and, times its length, from the lower arm, shape (N, 2)."""
-    joints = [robot.model.joints[place] for place in arm]
-    first, second, third = joints[:3]
-    wrist_B = _wrist_centre(robot, arm)
-    forward = np.cross(second.axis_B, first.axis_B)
-    is_level = abs(second.axis_B @ first.axis_B) < PARALLEL_TOL
-    if not is_level or np.linalg.norm(np.cross(second.axis_B, third.axis_B)) > PARALLEL_TOL:
-        raise InputError(
-            f"robots.{robot.name}: expected an arm whose axes 2 and 3 are parallel and cross axis 1, as its targets on "
-            f"the part state a configuration"
-        )
-    upper = rotation_about(second.axis_B, q[:, arm[1]])
-    elbow = upper @ (third.point_B - second.point_B)
-    bent = rotation_about(third.axis_B, q[:, arm[2]]) @ (wrist_B - third.point_B)
-    wrist = elbow + (upper @ bent[..., None])[..., 0]  # from axis 2
-    return np.stack(
-        [(wrist + second.point_B - first.point_B) @ forward, np.cross(elbow, wrist) @ second.axis_B], axis=1
-    )
-
-
-def _wrist_centre(robot: Robot, arm: list[int]) -> Array:
-    """The point at the reference configuration where the last three axes meet, in [m], shape (3,)."""
-    joints = [robot.model.joints[place] for place in arm[3:]]
-    across = [np.eye(3) - np.outer(joint.axis_B, joint.axis_B) for joint in joints]
-    right = np.sum([part @ joint.point_B for part, joint in zip(across, joints, strict=True)], axis=0)
-    centre = np.linalg.lstsq(np.sum(across, axis=0), right, rcond=None)[0]
-    gaps = [np.linalg.norm(part @ (centre - joint.point_B)) for part, joint in zip(across, joints, strict=True)]
-    if max(gaps) > MEETING_TOL:
-        raise InputError(
-            f"robots.{robot.name}: expected an arm whose axes 4, 5 and 6 meet in a point, as its targets on the part "
-            f"state a configuration"
-        )
-    return centre
 
 
 def _external(unit: RapidUnit, numbers: Array) -> list[str]:
