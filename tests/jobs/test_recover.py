@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.pen import PEN
 from builders.stored_cells import solve_into
 from builders.view_pages import data_of
 from recoveries import judged as brute_force
@@ -18,6 +19,7 @@ from cellplan.errors import InputError
 from cellplan.files.run.joint_tables import TableHeader, parse_table, render_table
 from cellplan.jobs.recover.judge import judged
 from cellplan.jobs.recover.planner import RecoveryPlanner
+from cellplan.jobs.recover.programs import recovery_programs
 from cellplan.jobs.recover.recover import Recovery, recover
 from cellplan.jobs.recover.result import write_recovery
 from cellplan.jobs.recover.state import RunPlaces, stopped_state
@@ -26,28 +28,6 @@ from cellplan.model.settings.program import TransferEntry
 from cellplan.runs.gate.open_gate import open_gate
 
 ROOT = Path(__file__).resolve().parents[2]
-PEN = """\
-cellplan: 1
-name: pen-on-box
-robots:
-  pen:
-    model: ur10e
-    base: {xyz_mm: [0, 0, 500]}
-    pedestal: {cylinder: {radius_mm: 120}}
-    tool: {xyz_mm: [0, 0, 150], bodies: [{cylinder: {radius_mm: 8, length_mm: 150}, at: {xyz_mm: [0, 0, 75]}}]}
-    start_deg: [10.497256989616, -101.593921554137, -111.772649969359, -56.633428476505, 90, -79.502743010384]
-part:
-  geometry: {box: {size_mm: [300, 300, 200]}}
-  at: {xyz_mm: [800, 0, 600]}
-tasks:
-  seam:
-    robot: pen
-    path: {polyline: {plane: xy, points_mm: [[-60, -40], [60, 40]]}, project: +z}
-environment:
-  floor: {plane: {z_mm: 0}}
-motion: {mode: part_at_rest, duration_s: 2, step_s: 0.02, time_law: quintic}
-checks: {clearance_mm: 5}
-"""
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +142,7 @@ def test_the_clock_names_the_phase_of_each_row(stopped: Recovery, tmp_path: Path
 
 
 def test_the_page_of_the_record_lists_its_keys(stopped: Recovery, pen: VerifiedRun, tmp_path: Path) -> None:
-    result = write_recovery(stopped, tmp_path / "found")
+    result = write_recovery(stopped, tmp_path / "found", {"csv": recovery_programs(pen, stopped, "csv")})
     none = write_recovery(recover(pen, at=0.5, keep=["pen"]), tmp_path / "none")
     text = (ROOT / "docs" / "reference" / "recovery-json.md").read_text(encoding="utf-8")
     sections = dict(part.split("\n", 1) for part in text.split("\n## ")[1:])
@@ -175,6 +155,7 @@ def test_the_page_of_the_record_lists_its_keys(stopped: Recovery, pen: VerifiedR
     assert listed("Record") == set(result) | set(none)
     assert listed("State") == set(result["state"]) | {f"robots.NAME.{key}" for key in robot}
     assert listed("Phase") == set(result["phases"][0])
+    assert listed("Programs") == set(result["programs"]["csv"])
     assert listed("Clearance") == set(result["clearance"])
     assert listed("Pair") == set(result["begins_too_near"][0])
     assert listed("Check") == set(result["checks"][0])

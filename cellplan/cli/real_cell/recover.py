@@ -4,14 +4,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cellplan.cli.options import shared
+from cellplan.cli.options.completion import one_of
 from cellplan.cli.options.given_options import require_choice
 from cellplan.cli.options.request import Options, option
 from cellplan.cli.terminal.output import Result, notes
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
+
+if TYPE_CHECKING:
+    from cellplan.model.report.verified_run import ReadRun
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,21 +47,31 @@ class RecoverOptions(Options):
             "--tcp-speed MM_S", "Largest speed of any tool tip, flange and point of a held part in mm/s, such as 250."
         ),
     ] = None
+    formats: Annotated[
+        tuple[str, ...],
+        option(
+            "--for FORMATS",
+            "Write programs in these formats too, such as rapid,krl; may be repeated.",
+            autocompletion=one_of("cellplan.programs.dialects:DIALECTS"),
+        ),
+    ] = ()
     output: Annotated[Path | None, option("-o, --output DIR", "Folder (default: RUN/recover).")] = None
     cell: shared.OriginalCell = None
     without_cell: shared.WithoutCell = False
+    controllers: shared.Controllers = None
     as_json: shared.AsJson = False
     quiet: shared.Quiet = False
     allow_dirs: shared.AllowDirs = ()
 
 
 def recover(options: RecoverOptions) -> Result:
-    """Write joint tables that bring a stopped cell off the part and home.
+    """Write joint tables, and programs, that bring a stopped cell off the part and home.
 
-    The run is verified first, and the tables of the recovery after they are written, as those of a run are. Exit
-    status: 0 written, 1 a check fails, 2 bad input, or a run that is changed or stale, 3 no recovery was found (the
-    reason is written, no tables), 4 internal error.
+    The run is verified first, and the tables of the recovery after they are written, as those of a run are; programs
+    too. Exit status: 0 written, 1 a check fails, 2 bad input, or a run that is changed or stale, 3 no recovery was
+    found (the reason is written, no tables), 4 internal error.
     """
+    from cellplan.jobs.recover.programs import recovery_frame, recovery_programs
     from cellplan.jobs.recover.recover import recover as recovered
     from cellplan.jobs.recover.result import default_folder, recovery_lines, refuse_unless_recoverable, write_recovery
     from cellplan.jobs.recover.state import refuse_state
@@ -70,25 +84,28 @@ def recover(options: RecoverOptions) -> Result:
     limits = speed_limits(options.speed, options.tcp_speed)
     folder = options.output or default_folder(options.run)
     refuse_unless_recoverable(folder, options.run)
+    formats = list(dict.fromkeys(name.strip() for text in options.formats for name in text.split(",")))
+
+    def refuse(read: "ReadRun") -> None:
+        refuse_state(read.cell, read.motion, at=at, frozen=frozen, keep=keep)
+        for form in formats:
+            recovery_frame(read, form)
+
     with progress_listener(quiet=options.quiet) as progress:
-        run = open_gate(
-            options.run,
-            cell=options.cell,
-            allow_dirs=options.allow_dirs,
-            refuse=lambda read: refuse_state(read.cell, read.motion, at=at, frozen=frozen, keep=keep),
-            progress=progress,
-        )
+        run = open_gate(options.run, **shared.sources(options), refuse=refuse, progress=progress)
         transfer = run.cell.program.transfer.changed(**limits)
         recovery = recovered(run, at=at, frozen=frozen, keep=keep, transfer=transfer, progress=progress)
-        record = write_recovery(recovery, folder)
+        programs = {form: recovery_programs(run, recovery, form) for form in formats if recovery.succeeded}
+        record = write_recovery(recovery, folder, programs)
         page = folder / VIEW_PAGE
         is_shown = recovery.blocked is not None and write_view_of_blocked(recovery.blocked, page)
     status = ExitStatus.PASSED if recovery.succeeded else ExitStatus.NO_SOLUTION
     verdict, *lines = recovery_lines(record)
+    stored = [f"programs: {folder / 'programs'}"] if programs else []
     place = f"tables: {folder / 'tables'}" if recovery.succeeded else f"reason: {folder / 'recovery.json'}"
     about = {"exit": int(status), "folder": str(folder), "remarks": list(run.remarks)}
     shown = [f"3-D page of the best try: {page}"] if is_shown else []
-    return Result(status, [verdict, *notes(run.remarks), *lines, place, *shown], {**record, **about})
+    return Result(status, [verdict, *notes(run.remarks), *lines, place, *stored, *shown], {**record, **about})
 
 
 def speed_limits(speed: str | None, tcp_speed: float | None) -> dict[str, float]:

@@ -17,7 +17,7 @@ from cellplan.files.run.joint_tables import parse_table
 from cellplan.geometry.transforms import Array
 from cellplan.jobs.recover.phases import RecoveryKind, RecoveryPhase, scene_of
 from cellplan.jobs.recover.state import RunPlaces, StoppedState
-from cellplan.model.motion.motion import Schedule
+from cellplan.model.motion.motion import JointTable, Schedule
 from cellplan.model.report.report import Check
 from cellplan.model.units import MM
 
@@ -80,13 +80,25 @@ def judged(
         phases: What they were written from: of these only kinds, scenes and numbers of rows are used.
     """
     tables = [parse_table(text, f"tables/{name}.csv") for name, text in texts.items()]
+    return judged_tables(tables, phases, places=places, state=state)
+
+
+def judged_tables(
+    tables: Sequence[JointTable],
+    phases: Sequence[RecoveryPhase],
+    *,
+    places: RunPlaces,
+    state: StoppedState,
+    tolerance: float = STATE_TOL,
+) -> RecoveryJudgement:
+    """The same of tables that were read, whose first row may be off by a tolerance in [rad] or [m]."""
     times, q = tables[0].times, np.concatenate([table.q for table in tables], axis=1)
     stopped = places.scene_while_stopped(state.lying)
     schedule = Schedule(times=times, tasks=())
     moving = [name for name in state.times if name not in state.standing]
     checks = list(verify_motion(stopped, schedule, tables, moving=moving, idle=()).checks)
     checks += check_mounting(stopped, q, times)
-    checks.append(_begins(q, state))
+    checks.append(_begins(q, state, tolerance))
     checks += _stand_still(q, phases, places)
     timed: list[TimedPhase] = []
     apart: list[Apart] = []
@@ -146,20 +158,20 @@ def _runs_of_retracts(phases: Sequence[RecoveryPhase]) -> list[list[RecoveryPhas
     return runs
 
 
-def _stays(name: str, subject: str, off: float, message: str, *, at_s: float | None) -> Check:
+def _stays(name: str, subject: str, off: float, message: str, *, at_s: float | None, limit: float = STATE_TOL) -> Check:
     """Whether something is where it has to be, to the rounding of the tables; by how much it is off in [rad] or [m]."""
-    is_there = off <= STATE_TOL
+    is_there = off <= limit
     unit = "rad or m"
     return Check(
-        name=name, subject=subject, passed=is_there, value=off, limit=STATE_TOL, unit=unit, at_s=at_s, message=message
+        name=name, subject=subject, passed=is_there, value=off, limit=limit, unit=unit, at_s=at_s, message=message
     )
 
 
-def _begins(q: Array, state: StoppedState) -> Check:
+def _begins(q: Array, state: StoppedState, tolerance: float) -> Check:
     """Whether the tables begin where the cell has stopped."""
     off = float(np.abs(q[0] - state.q).max())
-    message = f"begin: the first row is {off:.1e} rad or m from the stopped state, allowed {STATE_TOL:g}"
-    return _stays("begin", "cell", off, message, at_s=0.0)
+    message = f"begin: the first row is {off:.1e} rad or m from the stopped state, allowed {tolerance:g}"
+    return _stays("begin", "cell", off, message, at_s=0.0, limit=tolerance)
 
 
 def _stand_still(q: Array, phases: Sequence[RecoveryPhase], places: RunPlaces) -> list[Check]:

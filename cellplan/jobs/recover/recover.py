@@ -33,6 +33,7 @@ class Recovery:
         reason: Why none was found; empty otherwise.
         tried: What was tried before the way that was taken, and why it was not.
         blocked: The first transfer move that was not found, where no recovery was.
+        phases: What is done, with its rows; empty where no recovery was found.
     """
 
     cell: Cell
@@ -43,6 +44,7 @@ class Recovery:
     reason: str
     tried: tuple[str, ...]
     blocked: BlockedTransferError | None = None
+    phases: tuple[RecoveryPhase, ...] = ()
 
     @property
     def succeeded(self) -> bool:
@@ -119,6 +121,7 @@ def recover(
         judgement=judgement,
         reason="",
         tried=tuple(planner.refused),
+        phases=phases,
     )
 
 

@@ -10,11 +10,13 @@ import numpy as np
 from cellplan.certify.growth import ComingApart
 from cellplan.errors import InputError
 from cellplan.files.input.files import digest
-from cellplan.files.run.content import RECOVER, RECOVERY
+from cellplan.files.input.findings import listed
+from cellplan.files.run.content import PROGRAMS, RECOVER, RECOVERY
 from cellplan.files.run.folder import RunFolder, refuse_unless_replaceable
 from cellplan.files.run.joint_tables import program_digest, table_body
 from cellplan.geometry.transforms import Array
 from cellplan.jobs.recover.judge import Nearest, TimedPhase
+from cellplan.jobs.recover.programs import RecoveryPrograms
 from cellplan.jobs.recover.recover import Recovery
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.report import CAUTION
@@ -27,12 +29,15 @@ CLOCK: Final = "tables/clock.csv"  # what is done at each row, as in a run
 TITLE: Final = "cellplan recovery clock v1"
 LONGEST: Final = 3  # ways that were not taken that are shown
 
+Programs = Mapping[str, RecoveryPrograms]
+NONE: Final[Programs] = {}
+
 
 # The record: recovery.json
 
 
-def recovery_record(recovery: Recovery) -> dict[str, Any]:
-    """What ``recovery.json`` says, in deg, mm and s."""
+def recovery_record(recovery: Recovery, programs: Programs = NONE) -> dict[str, Any]:
+    """What ``recovery.json`` says, in deg, mm and s, of a recovery and its programs by format."""
     record: dict[str, Any] = {
         "schema": SCHEMA,
         "status": "found" if recovery.succeeded else "not_found",
@@ -55,7 +60,8 @@ def recovery_record(recovery: Recovery) -> dict[str, Any]:
         {"name": check.name, "subject": check.subject, "passed": check.passed, "message": check.message}
         for check in judgement.checks
     ]
-    files = {name: digest(text.encode()) for name, text in _files(recovery).items()}
+    record |= {"programs": {form: written.record for form, written in programs.items()}} if programs else {}
+    files = {name: digest(text.encode()) for name, text in _files(recovery, programs).items()}
     return record | {"files": files, "caution": CAUTION}
 
 
@@ -139,7 +145,17 @@ def recovery_lines(record: Mapping[str, Any]) -> list[str]:
             f"{nearest['at_s']:.3f} s), required {nearest['demand_mm']:.1f} mm"
         )
     lines += [f"  not taken: {words}" for words in record["not_taken"][:LONGEST]]
-    return lines
+    return [*lines, *_program_lines(record.get("programs", {}))]
+
+
+def _program_lines(programs: Mapping[str, Any]) -> Iterator[str]:
+    """What is promised of the programs in each format."""
+    for form, program in programs.items():
+        marks = max(map(len, program["marks"].values()))
+        met = f", all robots of the cell wait at {marks} marks" if marks else ""
+        yield f"  {form}: {', '.join(program['robots'])}: {program['promise']}{met}"
+        if program["by_hand"]:
+            yield f"    no format writes the waits of {listed(program['by_hand'])}: program them by hand"
 
 
 def _state_lines(record: Mapping[str, Any]) -> Iterator[str]:
@@ -168,12 +184,13 @@ def _limit_lines(limits: Mapping[str, Any]) -> Iterator[str]:
 # Files
 
 
-def write_recovery(recovery: Recovery, folder: Path) -> dict[str, Any]:
+def write_recovery(recovery: Recovery, folder: Path, programs: Programs = NONE) -> dict[str, Any]:
     """Write a recovery, its tables and their clock; its folder appears whole or not at all, in place of an older one.
 
     Args:
         recovery: The recovery; without tables where none was found.
         folder: Where its files go.
+        programs: Its programs by format.
 
     Returns:
         The record in ``recovery.json``.
@@ -181,10 +198,10 @@ def write_recovery(recovery: Recovery, folder: Path) -> dict[str, Any]:
     Raises:
         InputError: The folder cannot be written, or holds something else.
     """
-    record = recovery_record(recovery)
+    record = recovery_record(recovery, programs)
     with RunFolder(folder) as target:
         target.write_text(RECOVERY, json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
-        for name, text in _files(recovery).items():
+        for name, text in _files(recovery, programs).items():
             target.write_text(name, text)
     return record
 
@@ -207,12 +224,15 @@ def clock_text(recovery: Recovery) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _files(recovery: Recovery) -> dict[str, str]:
+def _files(recovery: Recovery, programs: Programs) -> dict[str, str]:
     """Text of every file beside the record, by its path; none where no recovery was found."""
     if not recovery.succeeded:
         return {}
     tables = {f"tables/{name}.csv": text for name, text in recovery.tables.items()}
-    return {CLOCK: clock_text(recovery), **tables}
+    of_programs = {
+        f"{PROGRAMS}/{form}/{path}": text for form, one in programs.items() for path, text in one.files.items()
+    }
+    return {CLOCK: clock_text(recovery), **tables, **of_programs}
 
 
 def default_folder(run: Path) -> Path:

@@ -135,7 +135,7 @@ def blocked_orders(
                 scene = raised(LeverArms(scene, np.concatenate(ends, axis=1)), scene, off[None], in_step=False)
             times = program.times[[stretch.first, stretch.last]]
             bounds = certify_regions(scene, q, regions)
-            known[key] = [_not_clear(stretch.phase, bound, times) for bound in bounds if not bound.is_met]
+            known[key] = [order_finding(stretch.phase, bound, times) for bound in bounds if not bound.is_met]
         yield from ((count, finding) for finding in known[key])
 
 
@@ -196,7 +196,7 @@ class PhaseSearch:
             nearest = rows[0] if rows else self._last
             bounds = [bound for bound in self._bounds(first, nearest, pairs) if not bound.is_met]
             worst = min(bounds, key=lambda bound: bound.distance)
-            raise NotVerifiedError([_not_clear(self._phase.name, worst, self._times[[first, nearest]])])
+            raise NotVerifiedError([order_finding(self._phase.name, worst, self._times[[first, nearest]])])
         return rows[low - 1]
 
     def _bounds(self, first: int, last: int, pairs: Sequence[Pair]) -> tuple[RegionBound, ...]:
@@ -238,8 +238,8 @@ def _off(cell: Cell, rows: ProgramRows, corners: Mapping[str, Array], count: int
     return off
 
 
-def _not_clear(phase: str, bound: RegionBound, times: Array) -> str:
-    """What is not clear, as one line."""
+def order_finding(phase: str, bound: RegionBound, times: Array) -> str:
+    """What is not clear in every order in a phase between two times in [s], shape (2,), as one line."""
     bodies = "" if bound.bodies is None else f" ({' and '.join(bound.bodies)})"
     if not np.isfinite(bound.distance):
         what = f"are proved to keep only {MM * min(bound.proved, bound.demand):.3g} mm"
