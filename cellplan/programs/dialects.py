@@ -5,6 +5,7 @@ from typing import Final
 
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.formats.csv import CSV
+from cellplan.programs.formats.fanuc_ls.writer import FANUC_LS
 from cellplan.programs.formats.json_tables import JSON
 from cellplan.programs.formats.krl.writer import KRL
 from cellplan.programs.formats.rapid.writer import RAPID
@@ -14,5 +15,5 @@ from cellplan.programs.formats.urscript.writer import URSCRIPT
 from cellplan.programs.formats.val3.writer import VAL3
 
 DIALECTS: Final[Mapping[str, Dialect]] = {
-    dialect.name: dialect for dialect in (CSV, JSON, KRL, RAPID, ROS2, STREAM, URSCRIPT, VAL3)
+    dialect.name: dialect for dialect in (CSV, FANUC_LS, JSON, KRL, RAPID, ROS2, STREAM, URSCRIPT, VAL3)
 }

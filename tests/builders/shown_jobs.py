@@ -6,12 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from builders.export_jobs import cell_of, controlled, job_of, positioner_model
+from builders.fanuc_jobs import CONTROLLER, FANUC, counted
 from builders.rapid_jobs import multimove_cell
 from builders.scene_builders import arm_model
 from builders.stream_jobs import with_latency
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell.cell import Robot, Tool
 from cellplan.model.report.exported import ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.robot.controller import ControllerZero
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.controllers import HandshakeEntry, KindName
 
@@ -60,6 +62,29 @@ def arm_and_positioner() -> ExportJob:
     times = np.arange(4) * STEP
     rows = {"weld": _rows("weld", ARMS["weld"], times=times), "table": _rows("table", TABLE, times=times)}
     return job_of(cell, ProgramRows(name=None, robots=rows), promise=Promise.SYNCHRONISED, blend=0.25)
+
+
+def _to_the_ground() -> ControllerZero:
+    """A counting of axis 3 against the ground."""
+    coupling = np.zeros((6, 6))
+    coupling[2, 1] = -1.0
+    return ControllerZero(zero=np.zeros(6), sign=np.ones(6), coupling=coupling, source="the model's own file")
+
+
+def waiting_fanucs() -> ExportJob:
+    """Two FANUC arms, four rows, one mark at the third row."""
+    return replace(counted(waiting_arms(FANUC, NUMBERS), _to_the_ground()), blend=0.5)
+
+
+def motion_groups() -> ExportJob:
+    """A FANUC arm and a positioner, two motion groups of one controller in step; no tool is in process."""
+    weld = controlled("weld", _named("arm"), id=CONTROLLER, group=1, tool_number=3)
+    table = controlled("table", positioner_model(), id=CONTROLLER, group=2)
+    times = np.arange(4) * STEP
+    rows = {"weld": _rows("weld", ARMS["weld"], times=times), "table": _rows("table", TABLE, times=times)}
+    program = ProgramRows(name=None, robots=rows)
+    job = job_of(cell_of(weld, table, kind=FANUC), program, promise=Promise.SYNCHRONISED, blend=0.5)
+    return counted(job, _to_the_ground())
 
 
 def timed_table(kind: KindName = "other") -> ExportJob:

@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 from cellplan.model.report.exported import ExportFrame, ExportJob, Interpolation, ProgramRows, Promise, Targets
 from cellplan.model.settings.controllers import KindName
 
+SHARES: Final = (0.5, 0.35, 0.25, 0.15, 0.1, 0.05, 0.0)  # [-] of a segment, the largest first
 Render = Callable[[ExportJob], dict[str, str]]
 Read = Callable[[ExportFrame, Mapping[str, str]], tuple[ProgramRows, ...]]
 Demands = Callable[[ExportFrame, int], Iterator[Callable[[], object]]]  # the rows of its longest program are counted
@@ -38,6 +40,7 @@ class Dialect:
     is_thinned: bool = False
     # whether its files round rows within a share of their segments; not those on the cycle either
     is_rounded: bool = False
+    shares: tuple[float, ...] = SHARES  # of its segments within which a row may be rounded, the largest first, 0 last
     lags: bool = False  # whether the target follows with a latency, which must be stated before ``timed`` is promised
     split: int | None = None  # most rows of a file or routine; None for no limit
     shortest_time: float = 0.0  # shortest time in [s] between two rows that targets are known to keep; 0 for no limit

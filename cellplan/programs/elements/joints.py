@@ -40,6 +40,15 @@ class Axes:
         return cls(arm=tuple(range(first, count)), external=tuple(range(first)))
 
 
+def require_counted(robot: Robot, kind: str) -> None:
+    """Refuse an arm on a controller that counts axis 3 its own way while nothing states how."""
+    if kind == "fanuc" and robot.model.controller is None and Axes.of(robot).arm:
+        raise InputError(
+            f"robots.{robot.name}.controller_zero: expected how the controller counts axis 3, which is counted "
+            f"against the horizontal there, got none"
+        )
+
+
 def to_numbers(robot: Robot, q: Array, *, decimals: int, angle: Angle = Angle.DEGREES) -> Array:
     """Positions of the controller as numbers of a file, rounded, none beyond a limit when they are read back.
 

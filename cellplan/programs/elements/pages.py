@@ -81,14 +81,14 @@ def program_paths(frame: ExportFrame, dialect: Dialect, rules: ProgramNames) -> 
     """
     robots = robots_of(frame, dialect)
     if len(frame.programs) == 1:
-        names = _page_names(robots, rules)
+        names = page_names(robots, rules)
         return {(frame.programs[0], robot): names[robot] for robot in robots}
     folders = safe_names(robots, longest=rules.longest)
-    programs = _page_names([name or "" for name in frame.programs], rules)
+    programs = page_names([name or "" for name in frame.programs], rules)
     return {(name, robot): f"{folders[robot]}/{programs[name or '']}" for name in frame.programs for robot in robots}
 
 
-def _page_names(names: Iterable[str], rules: ProgramNames) -> dict[str, str]:
+def page_names(names: Iterable[str], rules: ProgramNames) -> dict[str, str]:
     """Names of programs by the names in the cell: with the ending of a page still unique and short enough.
 
     No name ends like one of a page, so that ``weld_001`` is the first page of ``weld`` and nothing else.
@@ -160,11 +160,11 @@ def render_programs(
             name = program.name or job.frame.cell.name
             raise InputError(f"program '{name}': expected rows, and equal marks, got {got}")
         for robot in robots:
-            files |= files_of(_paged(job, dialect, program, robot, paths[program.name, robot]))
+            files |= files_of(paged(job, dialect, program, robot, paths[program.name, robot]))
     return files
 
 
-def _paged(job: ExportJob, dialect: Dialect, program: ProgramRows, robot: str, path: str) -> PagedProgram:
+def paged(job: ExportJob, dialect: Dialect, program: ProgramRows, robot: str, path: str) -> PagedProgram:
     """All that the files of one robot in one program are made of."""
     placed, rows = job.frame.robot(robot), program.robots[robot]
     decimals = decimals_of(placed, dialect.decimals)

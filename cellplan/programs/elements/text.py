@@ -26,15 +26,15 @@ def ascii_text(text: str) -> str:
     return "".join(letter if " " <= letter <= "~" else "?" for letter in letters)
 
 
-def comment(note: str, sign: str, *, forbidden: str = "") -> list[str]:
+def comment(note: str, sign: str, *, forbidden: str = "", longest: int = LINE) -> list[str]:
     """Comment lines of a note behind a sign such as ``;``; forbidden characters become question marks."""
     words = [re.sub(f"[{re.escape(forbidden)}]", "?", word) if forbidden else word for word in ascii_text(note).split()]
     lines = [""]
-    for word in words:
-        if lines[-1] and len(lines[-1]) + 1 + len(word) > LINE:
+    for part in (word[first : first + longest] for word in words for first in range(0, len(word), longest)):
+        if lines[-1] and len(lines[-1]) + 1 + len(part) > longest:
             lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return [f"{sign} {line[:LINE]}".rstrip() for line in lines]
+        lines[-1] = f"{lines[-1]} {part}".strip()
+    return [f"{sign} {line}".rstrip() for line in lines]
 
 
 def safe_names(names: Iterable[str], *, longest: int, reserved: Collection[str] = ()) -> dict[str, str]:

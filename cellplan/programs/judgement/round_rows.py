@@ -31,7 +31,7 @@ from cellplan.programs.rows.rows import times_of
 from cellplan.programs.shared import Shared
 from cellplan.scene.scene import Scene
 
-SHARES: Final = (0.5, 0.35, 0.25, 0.15, 0.1, 0.05, 0.0)  # [-] of a segment, the largest first
+ROUNDS: Final = 28  # of lowering shares until all tools are where they may be
 MARGINS: Final = (0.999, 0.95, 0.8)  # [-] of what is allowed that is used at rows; what lies between them may need more
 REACHES: Final = (np.inf, 4e-3, 1e-3, 2.5e-4)  # [m] that bodies may move at a corner, the largest first
 SAME: Final = 1e-12  # [rad] or [m] phases that are written alike are rounded alike
@@ -61,7 +61,7 @@ def with_rounding(
         programs, largest = [], 0.0
         played = played_programs(shared.run, dialect, rounded, _plain(read or job.programs), lead=lead)
         for place, (program, executed) in enumerate(zip(job.programs, played, strict=True)):
-            chosen = _Choice(rounded, program, executed, shared)
+            chosen = _Choice(dialect.shares, rounded, program, executed, shared)
             chosen.keep_demands()
             if orders:
                 chosen.keep_orders(orders[place])
@@ -91,10 +91,18 @@ def stops_left(job: ExportJob) -> tuple[int, int]:
 class _Choice:
     """The shares of one program while they are chosen."""
 
-    def __init__(self, job: ExportJob, program: ProgramRows, played: ExecutedProgram, shared: Shared) -> None:
+    def __init__(
+        self,
+        ladder: Sequence[float],
+        job: ExportJob,
+        program: ProgramRows,
+        played: ExecutedProgram,
+        shared: Shared,
+    ) -> None:
+        self._ladder = np.array(ladder[::-1])  # shares that the format can state, the smallest first
         self._job, self._given, self._played, self._shared = job, program, played, shared
         self._free = may_round(program, job.frame.promise)
-        self._chosen = {name: np.where(free, SHARES[0], 0.0) for name, free in self._free.items()}
+        self._chosen = {name: np.where(free, self._ladder[-1], 0.0) for name, free in self._free.items()}
         self._times = {name: times_of(played.rows[name]) for name in self._chosen}
         self._in_step = job.frame.promise is Promise.SYNCHRONISED
 
@@ -158,7 +166,7 @@ class _Choice:
     def _keep_tools(self, stretch: ExecutedStretch, scene: Scene, reserve: float) -> bool:
         """Lower shares until no tool leaves a share of what is allowed; whether all is kept then, between rows too."""
         allowed: dict[str, float] = {}
-        for _ in range(len(SHARES) * 4):
+        for _ in range(ROUNDS):
             rows = self._rows(stretch, scene)
             lowered = False
             for relation, errors, limit in _errors(rows):
@@ -191,7 +199,7 @@ class _Choice:
         for name, is_near in rows_of.items():
             chosen = self._chosen[name]
             is_lowered = is_near & (chosen > 0.0)
-            chosen[is_lowered] = _largest_within(chosen[is_lowered] - SAME)
+            chosen[is_lowered] = _largest_within(chosen[is_lowered] - SAME, self._ladder)
             lowered |= bool(np.any(is_lowered))
         return lowered
 
@@ -211,7 +219,9 @@ class _Choice:
             least = np.min(list(most.values()), axis=0)
             most = dict.fromkeys(most, least)
         for name, rows in names.items():
-            self._chosen[name][rows] = np.minimum(self._chosen[name][rows], _largest_within(most[name][rows]))
+            self._chosen[name][rows] = np.minimum(
+                self._chosen[name][rows], _largest_within(most[name][rows], self._ladder)
+            )
 
     def _shares(self) -> Mapping[str, Array]:
         """Share within which each row counts as rounded, by robot."""
@@ -281,8 +291,7 @@ def _rounded_at(row_times: Array, shares: Array, times: Array) -> Flags:
     return is_inside & (shares > 0.0)
 
 
-def _largest_within(most: Array) -> Array:
-    """The largest share that is tried, and not larger than each."""
-    ordered = np.array(SHARES[::-1])
-    largest: Array = ordered[np.maximum(np.searchsorted(ordered, most, side="right") - 1, 0)]
+def _largest_within(most: Array, ladder: Array) -> Array:
+    """The largest of the shares that are tried, by rising size, and not larger than each."""
+    largest: Array = ladder[np.maximum(np.searchsorted(ladder, most, side="right") - 1, 0)]
     return largest

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 from builders.export_jobs import NAMES, two_arms
+from builders.fanuc_jobs import waiting_job
 from builders.rapid_jobs import sequence_job
 
 from cellplan.model.report.exported import ExportJob
@@ -13,6 +14,11 @@ from cellplan.programs.dialects import DIALECTS
 
 MARKS = (0, 7, 19)
 EVENTS = {  # motion, output with its state, wait for a state
+    "fanuc_ls": (
+        r"\d+:J P",
+        r"\d+:  DO\[\d+\]=(ON)|\d+:  DO\[\d+\]=OFF",
+        r"\d+:  WAIT DI\S+=ON|\d+:  WAIT DI\S+=(OFF)",
+    ),
     "krl": (r"PTP XP", r"\$OUT\[\d+\]=(TRUE)|\$OUT\[\d+\]=FALSE", r"WAIT FOR \$IN|WAIT FOR (NOT)"),
     "rapid": (r"MoveAbsJ", r"SetDO \w+,(1)|SetDO \w+,0", r"WaitDI \w+,1|WaitDI \w+,(0)"),
     "val3": (r"movej\(", r"doMark=(true)|doMark=false", r"wait\(\w+==true|wait\(\w+==(false)"),
@@ -22,15 +28,22 @@ EVENTS = {  # motion, output with its state, wait for a state
 def job_in(form: str, split: int | None, marks: tuple[int, ...]) -> ExportJob:
     if form == "rapid":
         return sequence_job(marks=marks, split=split)
+    if form == "fanuc_ls":
+        return waiting_job(marks=marks, split=split)
     kind = {"krl": "kuka", "val3": "staubli"}[form]
     return two_arms(kind, marks=marks, split=split)
 
 
 def events(form: str, robot: str, files: Mapping[str, str]) -> list[tuple[str, bool]]:
     """Motions, outputs and waits of a robot in the order of its program, its pages in the place of their calls."""
-    main = {"krl": f"{robot}.src", "rapid": f"{robot}.mod", "val3": f"{robot}/start.pgx"}
+    main = {
+        "fanuc_ls": f"{robot.upper()}.ls",
+        "krl": f"{robot}.src",
+        "rapid": f"{robot}.mod",
+        "val3": f"{robot}/start.pgx",
+    }
     text = files[main[form]]
-    pages = [path for path in files if re.fullmatch(rf"(?:{robot}/)?{robot}_[0-9]{{3}}\.(?:src|mod|pgx)", path)]
+    pages = [path for path in files if re.fullmatch(rf"(?i)(?:{robot}/)?{robot}_[0-9]{{3}}\.(?:ls|src|mod|pgx)", path)]
     text += "".join(files[path] for path in sorted(pages))
     motion, output, wait = EVENTS[form]
     marks = []

@@ -24,7 +24,13 @@ from cellplan.programs.export.verify_export import verify_export
 pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 FORMATS = ("csv", "json", "ros2", "stream", "wide")  # those that the small cell can be exported in
-MAKERS = {"krl": ("kuka", "abb"), "rapid": ("kuka", "abb"), "val3": ("staubli", "ur"), "urscript": ("staubli", "ur")}
+MAKERS = {
+    "fanuc_ls": ("kuka", "fanuc"),
+    "krl": ("kuka", "abb"),
+    "rapid": ("kuka", "abb"),
+    "val3": ("staubli", "ur"),
+    "urscript": ("staubli", "ur"),
+}
 QUICK = ("val3", "urscript")  # of one cell
 ROUNDS, SEALED_ROUNDS, ALL_ROUNDS = 1, 1, 8
 
@@ -141,7 +147,9 @@ def test_no_broken_program_of_a_maker_is_verified_whose_digest_fits(
     assert all(str(tmp_path) in entry for entry in said)
 
 
-@pytest.mark.parametrize("form", [*QUICK, *(pytest.param(form, marks=pytest.mark.slow) for form in ("krl", "rapid"))])
+@pytest.mark.parametrize(
+    "form", [*QUICK, *(pytest.param(form, marks=pytest.mark.slow) for form in ("fanuc_ls", "krl", "rapid"))]
+)
 def test_untouched_programs_of_a_maker_are_verified(form: str, programs: Programs) -> None:
     folder, run = programs(form)
     assert verify_export(read_stored_export(folder), run).remarks == ()

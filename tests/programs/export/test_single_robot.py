@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from builders.export_jobs import zero_of
 
 from cellplan import VerifiedRun, load_cell, open_gate, solve, write_run
 from cellplan.errors import NotVerifiedError
@@ -29,7 +30,13 @@ tasks:
     tool_axis: normal
 motion: {mode: part_at_rest, duration_s: 1, step_s: 0.02, time_law: quintic}
 """
-WAITS = {"krl": ("$OUT", "WAIT"), "rapid": ("SetDO", "WaitDI"), "urscript": ("digital",), "val3": ("dio", "wait(")}
+WAITS = {
+    "fanuc_ls": ("DO[", "WAIT"),
+    "krl": ("$OUT", "WAIT"),
+    "rapid": ("SetDO", "WaitDI"),
+    "urscript": ("digital",),
+    "val3": ("dio", "wait("),
+}
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +50,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> VerifiedRun:
 @pytest.mark.parametrize(
     ("form", "kind"),
     [
+        ("fanuc_ls", "fanuc"),
         ("krl", "kuka"),
         ("rapid", "abb"),
         ("urscript", "ur"),
@@ -52,9 +60,11 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> VerifiedRun:
 def test_a_single_robot_has_programs_without_waits(alone: VerifiedRun, form: str, kind: KindName) -> None:
     control = RobotControlEntry(id="c", task="T_ROB1" if kind == "abb" else None)
     tasks = {"T_ROB1": "ROB_1"} if kind == "abb" else {}
+    robot = alone.cell.robots[0]
+    model = replace(robot.model, controller=zero_of(6)) if kind == "fanuc" else robot.model
     cell = replace(
         alone.cell,
-        robots=(replace(alone.cell.robots[0], control=control),),
+        robots=(replace(robot, model=model, control=control),),
         controllers={"c": ControllerEntry(kind=kind, tasks=tasks)},
     )
 

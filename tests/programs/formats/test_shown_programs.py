@@ -10,10 +10,12 @@ from builders.shown_jobs import (
     NUMBERS,
     STANDARD,
     arm_and_positioner,
+    motion_groups,
     servoed_arm,
     streamed_table,
     timed_table,
     waiting_arms,
+    waiting_fanucs,
 )
 
 from cellplan.model.report.exported import ExportJob
@@ -24,6 +26,7 @@ SHOWN = re.compile(r"^`(?P<path>[\w./]+)`[^\n]*:\n\n<!-- not run -->\n```\w+\n(?
 
 Shown = Sequence[tuple[ExportJob, Sequence[str]]]
 PAGES: dict[str, Shown] = {
+    "fanuc_ls": [(motion_groups(), ["R30.ls"]), (waiting_fanucs(), ["WELD.ls"])],
     "json": [(timed_table(), ["program.json"])],
     "krl": [(waiting_arms("kuka", NUMBERS), ["weld.src", "weld.dat"])],
     "rapid": [

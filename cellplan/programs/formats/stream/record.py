@@ -11,7 +11,7 @@ from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame
 from cellplan.model.robot.robot import Joint
 from cellplan.model.settings.controllers import ControllerEntry
-from cellplan.programs.elements.joints import Axes
+from cellplan.programs.elements.joints import Axes, require_counted
 from cellplan.programs.elements.json_tree import Raw, Written
 from cellplan.programs.elements.text import fixed
 from cellplan.programs.elements.timed_rows import cycle_of
@@ -110,11 +110,7 @@ def stated_controller(frame: ExportFrame, robot: Robot) -> ControllerEntry | Non
             f"controllers.{robot.control.id}.latency_ms: expected the time by which its robots follow a stream, as "
             f"controllers of kind {controller.kind} filter it, got none"
         )
-    if controller.kind == "fanuc" and robot.model.controller is None and Axes.of(robot).arm:
-        raise InputError(
-            f"robots.{robot.name}.controller_zero: expected how the controller counts axis 3, which is counted "
-            f"against the horizontal there, got none"
-        )
+    require_counted(robot, controller.kind)
     return controller
 
 

@@ -1,0 +1,1 @@
+"""TP programs of FANUC controllers as text (.ls): motion groups and names, writer and reader."""
