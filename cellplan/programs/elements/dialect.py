@@ -42,6 +42,7 @@ class Dialect:
     is_rounded: bool = False
     shares: tuple[float, ...] = SHARES  # of its segments within which a row may be rounded, the largest first, 0 last
     lags: bool = False  # whether the target follows with a latency, which must be stated before ``timed`` is promised
+    most_arms: int | None = None  # arms that its programs can move in step; None for any number
     split: int | None = None  # most rows of a file or routine; None for no limit
     shortest_time: float = 0.0  # shortest time in [s] between two rows that targets are known to keep; 0 for no limit
     is_proved: bool = False  # whether that time is documented by the maker, not only known from practice

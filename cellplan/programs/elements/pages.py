@@ -178,14 +178,14 @@ def paged(job: ExportJob, dialect: Dialect, program: ProgramRows, robot: str, pa
         numbers=numbers,
         decimals=decimals,
         speeds=_percentages(placed, rows),
-        shares=_shares(row_shares(job, program)[robot], numbers, pages),
+        shares=shares_as_written(row_shares(job, program)[robot], numbers, pages),
         first=[lowering_step(job.frame, robot)] if steps else [],
         steps=steps,
         pages=pages,
     )
 
 
-def _shares(shares: Array, numbers: Array, pages: Iterable[range]) -> Array:
+def shares_as_written(shares: Array, numbers: Array, pages: Iterable[range]) -> Array:
     """Shares within which a target rounds rows, shape (N,): as far as they may be, but for ends of pages.
 
     Rows that stand on a neighbour are no corner that could be rounded.
@@ -204,18 +204,20 @@ def read_programs(
     frame: ExportFrame,
     files: Mapping[str, str],
     paths: Mapping[tuple[str | None, str], str],
-    rows_of: Callable[[ExportFrame, str, dict[str, str], str], RobotRows],
+    rows_of: Callable[[ExportFrame, str, dict[str, str], str], tuple[RobotRows, ...]],
     *,
     ending: str = "",
 ) -> tuple[ProgramRows, ...]:
     """Programs as a reader finds them, which takes the files of each robot out of those that are left.
+
+    It finds rows of that robot, and of others that the same files move.
 
     Robots have equally many marks, else the file with this ending is named; no file may be left.
     """
     programs: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
     left = dict(files)
     for (program, robot), path in paths.items():
-        programs[program][robot] = rows_of(frame, robot, left, path)
+        programs[program] |= {rows.robot: rows for rows in rows_of(frame, robot, left, path)}
         if len({len(rows.marks) for rows in programs[program].values()}) > 1:
             raise InputError(f"{path}{ending}: expected as many marks as the programs of the other robots have")
     if left:

@@ -13,6 +13,7 @@ from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.model.task.task import Service
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.joints import Axes
 from cellplan.programs.promises.run_programs import moving_robots, run_programs, spoilt_by_another_order
 from cellplan.programs.promises.skew import PER_SECOND, ClockPair, RunSkew, skew_text
 
@@ -48,6 +49,15 @@ class _Export:
     requested: Promise | None
 
     @property
+    def promises(self) -> tuple[Promise, ...]:
+        """What the format can state of these robots, the best first; in step only so many arms on one controller."""
+        count, most = len(self.robots), self.dialect.most_arms
+        arms = sum(bool(Axes.of(self.run.cell.robot(name)).arm) for name in self.robots)
+        is_split = len(set(controllers_of(self.run.cell, self.robots).values())) > 1
+        cannot = most is not None and (is_split or arms == count or not 0 < arms <= most)
+        return tuple(it for it in self.dialect.promises if not (cannot and it is Promise.SYNCHRONISED))
+
+    @property
     def controllers(self) -> dict[str, ControllerEntry]:
         """The stated controllers of the robots that are exported, by name."""
         stated = self.run.cell.controllers
@@ -81,10 +91,10 @@ def choose_promise(
             reasons = tuple(f"not {better}: {reason.text}" for better, reason in failures.items())
             return Promised(promise=promise, reasons=reasons, remarks=tuple(_remarks(export, promise)))
         failures[promise] = against
-    unstated = [failures[promise].text for promise in dialect.promises if failures[promise].is_input]
+    unstated = [failures[promise].text for promise in export.promises if failures[promise].is_input]
     if unstated:
         raise InvalidFileError([InputError(text) for text in unstated])
-    *better, last = [promise for promise in failures if promise in dialect.promises]
+    *better, last = [promise for promise in failures if promise in export.promises]
     details = [f"  not {promise}: {failures[promise].text}" for promise in better]
     raise NotVerifiedError([f"{dialect.name}: not {last}: {failures[last].text}", *details, f"  cure: {_cure(export)}"])
 
@@ -98,7 +108,7 @@ def _cure(export: _Export) -> str:
         groups.setdefault(controller, []).append(robot)
     rest = "or let the part rest while a tool is in process (motion.mode: semi_coordinated or part_at_rest)"
     timed = "export joint tables that keep the plan's times (--format stream, csv, json, ros2 or wide)"
-    if Promise.SYNCHRONISED in export.dialect.promises:
+    if Promise.SYNCHRONISED in export.promises:
         if len(groups) > 1:
             return f"state one controller for {listed(every)}, if it moves them all, {rest}; {timed}"
         return f"export all robots of controller '{next(iter(groups))}' together, without --robot, {rest}; {timed}"
@@ -120,7 +130,7 @@ def controllers_of(cell: Cell, robots: Sequence[str]) -> dict[str, str]:
 
 def _against(export: _Export, promise: Promise) -> _Against | None:
     """Why a promise cannot be made; None where it can."""
-    if promise not in export.dialect.promises:
+    if promise not in export.promises:
         return _Against(f"{export.dialect.name} programs cannot state it")
     if export.requested is not None and promise is not export.requested:
         return _Against(f"'{export.requested}' was asked for")

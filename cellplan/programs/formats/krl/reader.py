@@ -1,17 +1,18 @@
 """Strict reader of KUKA programs: the written subset and harmless variants of it, nothing else."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isnan
 from typing import Final
 
 import numpy as np
 
-from cellplan.model.report.exported import ExportFrame, ProgramRows, RobotRows
+from cellplan.model.report.exported import ExportFrame, ProgramRows, Promise, RobotRows
 from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step
-from cellplan.programs.elements.joints import Axes, from_numbers
+from cellplan.programs.elements.joints import from_numbers
 from cellplan.programs.elements.pages import read_programs
 from cellplan.programs.elements.text import Statement
+from cellplan.programs.formats.krl.axes import moved_robots, order_of_axes
 from cellplan.programs.formats.krl.text import WHOLE, KrlModule, read_module
 
 MOST_ADVANCE: Final = 5  # motions that a controller can read ahead
@@ -25,22 +26,24 @@ def read_krl(
 
     ``paths``: path of each main module without its ending, by program and robot. An ``InputError`` has file and line.
     """
-    return read_programs(frame, files, paths, _rows, ending=".src")
+    return read_programs(frame, files, paths, lambda *program: tuple(_rows(*program)), ending=".src")
 
 
-def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> RobotRows:
+def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> Iterator[RobotRows]:
     """Rows of the model from the numbers of the points; takes the files of one robot out of those that are left."""
-    player, placed = _played(frame, robot, left, path), frame.robot(robot)
-    axes, numbers = Axes.of(placed), np.array(player.rows, dtype=np.float64)
-    written = np.zeros((len(numbers), len(placed.model.joints)))
-    written[:, axes.arm] = numbers[:, :6]
-    written[:, axes.external] = numbers[:, 6 : 6 + len(axes.external)]
-    return RobotRows(
-        robot=robot,
-        q=from_numbers(placed, written),
-        marks=tuple(player.marks),
-        rounding=np.array(player.rounding) / WHOLE,
-    )
+    player = _played(frame, robot, left, path)
+    numbers, first = np.array(player.rows, dtype=np.float64), 0
+    for name in moved_robots(frame, robot):
+        order = order_of_axes(frame, name)
+        written = np.zeros((len(numbers), len(order)))
+        written[:, order] = numbers[:, first : first + len(order)]
+        first += len(order)
+        yield RobotRows(
+            robot=name,
+            q=from_numbers(frame.robot(name), written),
+            marks=tuple(player.marks),
+            rounding=np.array(player.rounding) / WHOLE,
+        )
 
 
 def _played(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> "_KrlPlayer":
@@ -195,8 +198,8 @@ class _KrlPlayer:
 
     def _values(self, module: KrlModule, name: str) -> Sequence[float]:
         """Components of a point, as many as the robot has axes; unused external ones have to be at zero."""
-        values, axes = module.points[name], Axes.of(self.frame.robot(self.robot))
-        count = len(axes.arm) + len(axes.external)
+        values = module.points[name]
+        count = sum(len(order_of_axes(self.frame, robot)) for robot in moved_robots(self.frame, self.robot))
         if any(map(isnan, values[:count])) or any(value != 0.0 and not isnan(value) for value in values[count:]):
             expected = f"values for the {count} axes of the robot and for no other"
             raise module.lines[name].error(expected, name.upper())
@@ -204,7 +207,8 @@ class _KrlPlayer:
 
     def _signal(self, module: KrlModule, statement: Statement) -> None:
         """An instruction of a handshake."""
-        expected, row = handshake_steps(self.frame, self.robot), len(self.rows) - 1
+        waits = self.frame.promise is not Promise.SYNCHRONISED
+        expected, row = handshake_steps(self.frame, self.robot) if waits else (), len(self.rows) - 1
         if expected and not self.lowered:
             first = lowering_step(self.frame, self.robot)
             if row >= 0 or self.calls or _step(statement) != first:

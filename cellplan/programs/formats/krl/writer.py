@@ -1,20 +1,30 @@
-"""KUKA KRL: a module of a .src and a .dat file for each robot, one PTP motion to each row, pages as subprograms."""
+"""KUKA KRL: a module of a .src and a .dat file for each arm, one PTP motion to each row, pages as subprograms."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
-from itertools import zip_longest
+from itertools import chain, zip_longest
 from math import floor
 from typing import Final
 
+import numpy as np
+
 from cellplan.errors import raise_findings, refusals
-from cellplan.model.report.exported import ExportFrame, ExportJob, Promise
+from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise
+from cellplan.programs.elements.corners import LARGEST_SHARE, moves, row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.handshake import HandshakeStep
-from cellplan.programs.elements.joints import Axes
-from cellplan.programs.elements.pages import PagedProgram, program_paths, render_programs, require_six_axes
+from cellplan.programs.elements.pages import (
+    PagedProgram,
+    paged,
+    program_paths,
+    render_programs,
+    shares_as_written,
+)
 from cellplan.programs.elements.text import comment, fixed, joined
+from cellplan.programs.formats.krl.axes import demands, moved_robots, order_of_axes, played_robots
 from cellplan.programs.formats.krl.reader import read_krl
-from cellplan.programs.formats.krl.text import AXES, EXTERNAL, MODULES, POINT, WHOLE, require_numbers
+from cellplan.programs.formats.krl.text import AXES, MODULES, POINT, WHOLE
 
 DECIMALS: Final = 5
 PAGE: Final = 1000  # rows; public programs are split at 1400 to 2500 lines
@@ -29,24 +39,51 @@ def render_krl(job: ExportJob) -> dict[str, str]:
     ``InputError`` for a robot without a KUKA controller, that is no arm of six axes with at most six others before it,
     lacks a signal, or has a position that cannot be written with the decimals.
     """
-    paths = program_paths(job.frame, KRL, MODULES)
-    raise_findings(refusals(*_demands(job.frame, 0)))
-    return render_programs(job, KRL, paths, _files)
+    raise_findings(refusals(*demands(job.frame, 0)))
+    paths, files = _paths(job.frame), dict[str, str]()
+    if job.frame.promise is not Promise.SYNCHRONISED:
+        return render_programs(job, KRL, paths, partial(_files, job.frame))
+    for program in job.programs:
+        for robot in played_robots(job.frame).robots:
+            files |= _in_step(job, program, moved_robots(job.frame, robot), paths[program.name, robot])
+    return files
 
 
-def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
-    """What these programs need of the cell."""
-    for robot in frame.robots:
-        yield partial(require_numbers, frame, robot)
-        yield partial(require_six_axes, frame.robot(robot), external=EXTERNAL, what="KRL")
+def _paths(frame: ExportFrame) -> dict[tuple[str | None, str], str]:
+    """Path of each program without an ending, by its name and robot."""
+    return program_paths(played_robots(frame), KRL, MODULES)
 
 
-def _files(program: PagedProgram) -> dict[str, str]:
-    """The module of a program, or its main module and those of its pages."""
+def _files(frame: ExportFrame, program: PagedProgram) -> dict[str, str]:
+    """The files of a robot by itself."""
+    return _modules(replace(program, numbers=program.numbers[:, order_of_axes(frame, program.placed.name)]))
+
+
+def _in_step(job: ExportJob, program: ProgramRows, robots: Sequence[str], path: str) -> dict[str, str]:
+    """The files of an arm and of positioners that move with it: each row is a point of all their axes."""
+    parts = [paged(job, KRL, program, robot, path) for robot in robots]
+    shares = row_shares(job, program)
+    numbers = np.hstack([part.numbers[:, order_of_axes(job.frame, part.placed.name)] for part in parts])
+    whole = np.minimum.reduce(
+        [np.where(np.any(moves(part.rows), axis=0), shares[part.placed.name], LARGEST_SHARE) for part in parts]
+    )
+    return _modules(
+        replace(
+            parts[0],
+            notes=list(dict.fromkeys(chain.from_iterable(part.notes for part in parts))),
+            numbers=numbers,
+            decimals=max(part.decimals for part in parts),
+            speeds=np.max([part.speeds for part in parts], axis=0).tolist(),
+            shares=shares_as_written(whole, numbers, parts[0].pages),
+        )
+    )
+
+
+def _modules(program: PagedProgram) -> dict[str, str]:
+    """The module of a program, or its main module and those of its pages; numbers are in the order of a point."""
     setup = _setup(program)
     if len(program.pages) == 1:
-        moves = _moves(program, program.pages[0])
-        return _module(program, program.path, [*setup, *moves], program.pages[0])
+        return _module(program, program.path, [*setup, *_moves(program, program.pages[0])], program.pages[0])
     calls = [f"{program.name}{ending}()" for ending in program.endings]
     files = _module(program, program.path, [*setup, *calls], range(0), calls)
     for ending, page in zip(program.endings, program.pages, strict=True):
@@ -97,8 +134,7 @@ def _module(
     """Both files of a module; points are declared in the order of their rows."""
     name, head = path.rpartition("/")[2], [line for note in program.notes for line in comment(note, ";")]
     source = [*HEADER, f"DEF {name}()", *head, *(f"EXT {call}" for call in calls), *statements, "END"]
-    axes = Axes.of(program.placed)
-    numbers = program.numbers[page.start : page.stop, [*axes.arm, *axes.external]].tolist()
+    numbers = program.numbers[page.start : page.stop].tolist()
     points = [
         f"DECL E6AXIS {POINT}{row + 1}={{{_components(values, program.decimals)}}}"
         for row, values in zip(page, numbers, strict=True)
@@ -116,12 +152,13 @@ KRL: Final[Dialect] = Dialect(
     name="krl",
     title="KUKA KRL: a .src and a .dat file for each robot",
     render=render_krl,
-    read=lambda frame, files: read_krl(frame, files, program_paths(frame, KRL, MODULES)),
+    read=lambda frame, files: read_krl(frame, files, _paths(frame)),
     decimals=DECIMALS,
-    promises=(Promise.SEQUENCE_ONLY,),
+    promises=(Promise.SYNCHRONISED, Promise.SEQUENCE_ONLY),
+    most_arms=1,
     kinds=frozenset({"kuka"}),
     is_thinned=True,
     is_rounded=True,
     split=PAGE,
-    demands=_demands,
+    demands=demands,
 )

@@ -33,14 +33,14 @@ def read_val3(
     return read_programs(frame, files, paths, _rows)
 
 
-def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> RobotRows:
+def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> tuple[RobotRows]:
     """Rows of one robot; takes the files of its project out of those that are left."""
     player = _Val3Player(frame=frame, robot=robot, project=_project(left, path))
     player.play_all()
     placed = frame.robot(robot)
     q = from_numbers(placed, np.array(player.rows, dtype=np.float64).reshape(-1, 6))
     rounding = tool_shares(placed, q, np.array(player.zones) / MM)
-    return RobotRows(robot=robot, q=q, marks=tuple(player.marks), rounding=rounding)
+    return (RobotRows(robot=robot, q=q, marks=tuple(player.marks), rounding=rounding),)
 
 
 class _Val3Program(NamedTuple):

@@ -1,0 +1,48 @@
+"""Axes of a KUKA controller: those of an arm, then external ones: its rail, and positioners that move with it."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+
+from cellplan.errors import InputError
+from cellplan.model.report.exported import ExportFrame, Promise
+from cellplan.programs.elements.joints import Axes
+from cellplan.programs.elements.pages import require_six_axes
+from cellplan.programs.formats.krl.text import EXTERNAL, require_numbers
+
+
+def played_robots(frame: ExportFrame) -> ExportFrame:
+    """The frame with the robots that have programs of their own: in step, arms alone."""
+    if frame.promise is not Promise.SYNCHRONISED:
+        return frame
+    return replace(frame, robots=tuple(name for name in frame.robots if Axes.of(frame.robot(name)).arm))
+
+
+def moved_robots(frame: ExportFrame, robot: str) -> tuple[str, ...]:
+    """Robots whose axes stand in the points of a robot's program: itself first, in step all others too."""
+    others = [name for name in frame.robots if name != robot]
+    return (robot, *others) if frame.promise is Promise.SYNCHRONISED else (robot,)
+
+
+def order_of_axes(frame: ExportFrame, robot: str) -> list[int]:
+    """Places of the joints of a robot in the order of a point: its arm, then its external axes."""
+    axes = Axes.of(frame.robot(robot))
+    return [*axes.arm, *axes.external]
+
+
+def demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+    """What these programs need of the cell."""
+    for robot in played_robots(frame).robots:
+        yield partial(require_numbers, frame, robot)
+        yield partial(require_six_axes, frame.robot(robot), external=EXTERNAL, what="KRL")
+        yield partial(_require_places, frame, robot)
+
+
+def _require_places(frame: ExportFrame, arm: str) -> None:
+    """Refuse more external axes than a point holds."""
+    count = sum(len(order_of_axes(frame, robot)) for robot in moved_robots(frame, arm)[1:])
+    if len(Axes.of(frame.robot(arm)).external) + count > EXTERNAL:
+        raise InputError(
+            f"robots.{arm}: expected at most {EXTERNAL} external axes with it on its controller, got "
+            f"{len(Axes.of(frame.robot(arm)).external) + count}"
+        )
