@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.report.exported import Station
 from cellplan.programs.elements.conventions import Convention, convention_of
 from cellplan.programs.elements.frames import controller_base, on_flange
 from cellplan.programs.elements.joints import Axes
-from cellplan.programs.promises.stations import Station
 from cellplan.report.floor_plan.pendants import PlanFrame, PlanPendant
 
 ORIGINS: Final = {"base": "base", "tool_frame": "flange"}  # what is counted from, by key

@@ -57,7 +57,7 @@ def played_digest(played: ExecutedProgram) -> str:
     state.update(repr(about).encode())
     for name, rows in played.rows.items():
         state.update(repr((name, rows.marks)).encode())
-        for values in (rows.q, rows.times, rows.qd, rows.process):
+        for values in (rows.q, rows.times, rows.qd, rows.process, *(() if rows.tube is None else (rows.tube,))):
             state.update(b"none" if values is None else repr((values.dtype.str, values.shape)).encode())
             state.update(b"" if values is None else np.ascontiguousarray(values).tobytes())
     for name, shares in played.shares.items():

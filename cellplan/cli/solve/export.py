@@ -43,19 +43,20 @@ class ExportOptions(Options):
         tuple[str, ...],
         option("--robot NAME", "Only this robot; may be repeated (default: all whose controller plays the format)."),
     ] = ()
-    targets: Annotated[
+    moves: Annotated[
         str,
         option(
-            "--targets KIND",
-            "What rows state: joints, or part: tool poses on the part.",
-            autocompletion=one_of("cellplan.model.report.exported:Targets"),
+            "--moves KIND",
+            "How tools move where they work: joints, linear (lines and arcs in a frame of the part), or auto: linear "
+            "where it can be.",
+            autocompletion=one_of("cellplan.model.report.exported:Moves"),
         ),
     ] = "joints"
     promise: Annotated[
         str | None,
         option(
             "--promise WORD",
-            "Only this promise: timed, synchronised or sequence (default: the best that holds).",
+            "Only this promise: timed, synchronised, paced or sequence (default: the best that holds).",
             autocompletion=one_of("cellplan.model.report.exported:Promise"),
         ),
     ] = None
@@ -116,12 +117,12 @@ def export(options: ExportOptions) -> Result:
 
 def _choice(options: ExportOptions) -> "Choice":
     """What of the run is exported, and how."""
-    from cellplan.model.report.exported import Promise, Targets
+    from cellplan.model.report.exported import Moves, Promise
     from cellplan.programs.export.choice import Choice
 
-    targets = {str(kind): kind for kind in Targets}
+    moves = {str(kind): kind for kind in Moves}
     promises = {None: None} | {promise.split()[0]: promise for promise in Promise}
-    for name, word, known in (("targets", options.targets, targets), ("promise", options.promise, promises)):
+    for name, word, known in (("moves", options.moves, moves), ("promise", options.promise, promises)):
         if word not in known:
             raise InputError(f"--{name}: expected one of {', '.join(filter(None, known))}, got '{word}'")
-    return options.to(Choice, targets=targets[options.targets], promise=promises[options.promise])
+    return options.to(Choice, moves=moves[options.moves], promise=promises[options.promise])

@@ -1,7 +1,7 @@
 """What is exported: rows of joint positions as a target holds them, and what may be promised of them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -16,7 +16,13 @@ class Promise(StrEnum):
 
     TIMED = "timed"
     SYNCHRONISED = "synchronised"
+    PACED = "paced"
     SEQUENCE_ONLY = "sequence only"
+
+    @property
+    def waits(self) -> bool:
+        """Whether robots share no clock: they wait for one another at marks."""
+        return self in {Promise.PACED, Promise.SEQUENCE_ONLY}
 
 
 class Interpolation(StrEnum):
@@ -26,11 +32,41 @@ class Interpolation(StrEnum):
     CUBIC = "cubic"
 
 
-class Targets(StrEnum):
-    """What a row of a program states."""
+class Moves(StrEnum):
+    """How a program moves a tool where it works: by its joints, or straight and on circles in a frame of the part."""
 
     JOINTS = "joints"
-    PART = "part"
+    LINEAR = "linear"
+    AUTO = "auto"  # linear where it can be
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Station:
+    """A frame in which tools of a robot work.
+
+    Attributes:
+        tasks: Names of the tasks, in the order of work.
+        number: Its number on the controller; None where none is stated.
+        holder: Name of the robot of the same controller whose flange moves it; None for a fixed frame.
+        X: The part in the base of the controller, or in the flange of the holder as the controller has it, in [m]; None
+            where another controller moves the part while the tool works, so that no frame has it.
+        X_W: A fixed frame in the world in [m]; None for any other.
+    """
+
+    tasks: tuple[str, ...]
+    number: int | None = None
+    holder: str | None = None
+    X: Array | None = None
+    X_W: Array | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seam:
+    """Rows of a robot that its tool passes on lines and arcs in the frame of a part that rests."""
+
+    task: str  # name of the task
+    first: int  # the row at which it is entered, stated as joints
+    last: int  # its last row, stated as a pose of the tool as all between
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,10 +93,27 @@ class RobotRows:
     # configuration of the arm that was read with each of these targets, shape (N, 4), as the format counts it; None
     # where none was read
     configuration: NDArray[np.int_] | None = None
+    # stretches of rows that are passed on lines and arcs at a stated speed of the tool; empty for rows without any
+    seams: tuple[Seam, ...] = ()
+    # speed of the tool in [m/s] on the way to each row of a seam, shape (N,); NaN in all other rows, None without any
+    feeds: Array | None = None
+    # rows through which an arc leads to the next row, shape (N,); None for rows without any
+    middles: NDArray[np.bool_] | None = None
+    # how far the tool may be from the even motion of the joints in each step, in [m] and [rad], shape (N - 1, 2); None
+    # for a target that moves them evenly
+    tube: Array | None = None
 
     def __len__(self) -> int:
         """Number of rows."""
         return len(self.q)
+
+    @property
+    def on_seam(self) -> NDArray[np.bool_]:
+        """Rows to which a line or an arc leads, shape (N,)."""
+        flags = np.zeros(len(self.q), dtype=bool)
+        for seam in self.seams:
+            flags[seam.first + 1 : seam.last + 1] = True
+        return flags
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,12 +132,22 @@ class ExportFrame:
     robots: tuple[str, ...]  # names of the robots that are exported, in the order of the cell
     programs: tuple[str | None, ...]  # names of the programs, in their order
     promise: Promise  # what is promised
-    targets: Targets = Targets.JOINTS  # what rows state
+    moves: Moves = Moves.JOINTS  # how tools move where they work
     split: int | None = None  # most rows of a file or of a routine; None for the limit of the format
+    stations: Mapping[str, tuple[Station, ...]] = field(default_factory=dict)  # of robots with seams, by robot
 
     def robot(self, name: str) -> Robot:
         """A robot of the cell."""
         return self.cell.robot(name)
+
+    @property
+    def has_part_targets(self) -> bool:
+        """Whether rows of robots that move in step are stated as poses of their tools on the part."""
+        return self.moves is Moves.LINEAR and self.promise is Promise.SYNCHRONISED
+
+    def station(self, robot: str, task: str) -> Station:
+        """The frame in which a robot works on a task; its place among ``stations`` is its name in files."""
+        return next(station for station in self.stations[robot] if task in station.tasks)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -18,12 +18,14 @@ from cellplan.model.task.task import Frame, Task
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.start.given import is_off, part_pose, tool_distance
 from cellplan.planning.start.inverse_kinematics import finite_limits, reaching_configurations, within_limits
-from cellplan.planning.start.trial_motion import StartTrials
+from cellplan.planning.start.trial_motion import StartTrial, StartTrials
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
 SEEDS: Final = 24  # configurations round the last one from which the inverse kinematics begins
 SPREAD: Final = 0.5  # [rad or m] of these round it
+MOST_TRIED: Final = 16  # configurations of an arm that are tried where the nearest leads through a singular one
+WIDE_SPREAD: Final = 2.0  # [rad or m] of as many more for a tool in process, which may need another branch
 FARTHEST: Final = 1.0  # [rad or m] that a joint turns while the tool is drawn back: more is another branch
 
 
@@ -42,38 +44,66 @@ def near_start(scene: Scene, paths: Mapping[str, ClockedPath], last: Mapping[str
     if all(robot.start is not None for robot in cell.robots):
         return None
     by_robot = {task.robot: task for task in cell.tasks}
-    starts: list[Array] = []
+    choices: dict[str, Array] = {}
     for robot in cell.robots:
-        start: Array | None = robot.start
-        if start is None and robot.name in last:
-            task = by_robot.get(robot.name)
-            start = last[robot.name] if task is None else _nearest(scene, task, paths[task.name], last[robot.name])
-        if start is None:
+        if robot.start is not None:
+            choices[robot.name] = robot.start[None]
+        elif robot.name not in last:
             return None
-        starts.append(start)
-    start = np.concatenate(starts)
-    trial = StartTrials(scene, paths).judge(NameOrder.of(cell).sorted(start), may_turn=False)
-    return start if trial.is_sound else None
+        elif robot.name not in by_robot:
+            choices[robot.name] = last[robot.name][None]
+        else:
+            task = by_robot[robot.name]
+            choices[robot.name] = _nearest(scene, task, paths[task.name], last[robot.name])
+        if not len(choices[robot.name]):
+            return None
+    return _without_crossing(scene, StartTrials(scene, paths), choices)
 
 
-def _nearest(scene: Scene, task: Task, path: ClockedPath, last: Array) -> Array | None:
-    """The configuration nearest to the last one, by the time at top speed, that puts a tool on its start."""
+def _without_crossing(scene: Scene, trials: StartTrials, choices: Mapping[str, Array]) -> Array | None:
+    """The nearest sound start, of each robot the nearest one from which its arm passes no singular configuration.
+
+    ``choices`` are configurations of each robot, the nearest first, shape (K, n). Where all of an arm pass one, the
+    nearest counts.
+    """
+
+    def stacked() -> Array:
+        return np.concatenate([choices[robot.name][picks[robot.name]] for robot in scene.cell.robots])
+
+    def trial() -> StartTrial:
+        return trials.judge(NameOrder.of(scene.cell).sorted(stacked()), may_turn=False)
+
+    picks = dict.fromkeys(choices, 0)
+    nearest = trial()
+    for name in sorted(nearest.crossing):
+        for pick in range(1, len(choices[name]), -(-len(choices[name]) // MOST_TRIED)):
+            picks[name] = pick
+            other = trial()
+            if other.is_sound and name not in other.crossing:
+                nearest = other
+                break
+        else:
+            picks[name] = 0
+    return stacked() if nearest.is_sound else None
+
+
+def _nearest(scene: Scene, task: Task, path: ClockedPath, last: Array) -> Array:
+    """Configurations that put a tool on its start, the nearest to the last one by the time at top speed first."""
     cell, chain = scene.cell, scene.chains[task.robot]
     holder = cell.robot(cell.positioners[0]).start if cell.positioners else None
     X_WR = np.eye(4) if task.relative_to is Frame.WORLD else part_pose(cell, holder)
     if X_WR is None:
-        return None
-    random = generator(task.robot, cell.solver.seed).uniform(-SPREAD, SPREAD, (SEEDS, len(last)))
-    seeds = np.concatenate([last[None], last + random])
+        return np.empty((0, len(last)))
+    draw = generator(task.robot, cell.solver.seed).uniform
+    spreads = (SPREAD,) if task.process is None else (SPREAD, WIDE_SPREAD)
+    seeds = np.concatenate([last[None], *(last + draw(-spread, spread, (SEEDS, len(last))) for spread in spreads)])
     model = cell.robot(task.robot).model
     arrived = reaching_configurations(chain, task, path.toolpath.X_PT_start, X_WP=X_WR, seeds=seeds)
     inside = arrived[np.all((arrived >= model.lower) & (arrived <= model.upper), axis=1)]
     turned = within_limits(model, arrived)
     q = np.concatenate([inside, turned])
-    if not len(q):
-        return None
     times = (np.abs(q - last) / model.velocity).max(axis=1)
-    nearest: Array = q[int(np.argmin(np.round(times, 6)))]
+    nearest: Array = q[np.argsort(np.round(times, 6), kind="stable")]
     return nearest
 
 

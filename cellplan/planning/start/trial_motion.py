@@ -35,6 +35,7 @@ TOUCH_INSTANTS: Final = 12  # times of the coarse motion that are considered for
 TRIED_WITH: Final = "weighted_pseudo_inverse"  # fast, and it shows how far a configuration would go beyond its limits
 CLOSE_ENOUGH: Final = 1e-4  # [m] and [rad] tool error of the closer look: it is about joints
 MOST_BREAKS: Final = 500  # of the desired motion up to which a closer look costs some tenths of a second
+ARM: Final = 6  # joints of an arm whose Jacobian is square
 LOST: Final = -1e6  # stands for the share that a motion leaves free which loses its path
 
 
@@ -47,6 +48,8 @@ class StartTrial:
     speeds: Array  # share of its speed limit that each joint leaves free, shape (nq,); negative above the limit
     is_followed: bool = True  # whether every tool keeps to its path
     contact: str = ""  # what collides first on the way, and where; empty where nothing does
+    # arms that pass a singular configuration while their process is on, where no controller could move a tool on lines
+    crossing: frozenset[str] = frozenset()
 
     @property
     def touches(self) -> bool:
@@ -71,7 +74,7 @@ class StartTrial:
     @property
     def figures(self) -> Array:
         """What trials are compared by: sound ones first, then by the worst share, the next one, the configuration."""
-        signs = [float(self.is_sound), float(self.is_followed), float(not self.touches)]
+        signs = [float(self.is_sound), float(self.is_followed), float(not self.touches), -float(len(self.crossing))]
         return np.concatenate([signs, self.shares, self.start])
 
 
@@ -145,6 +148,7 @@ class StartTrials:
             ranges=np.min([ranges for ranges, _ in shares], axis=0),
             speeds=np.min([speeds for _, speeds in shares], axis=0),
             contact=next(filter(None, map(self._contact_on_path, self._phases, motions)), ""),
+            crossing=frozenset[str]().union(*map(self._crossing, self._phases, motions)),
         )
 
     def looked_at_closely(self, trials: Sequence[StartTrial]) -> list[StartTrial]:
@@ -215,6 +219,18 @@ class StartTrials:
             if pair is not None:
                 return f"'{pair[0]}' touches '{pair[1]}' at {100 * sample / max(1, len(q) - 1):.0f} % of the way"
         return ""
+
+    def _crossing(self, phase: Phase, q: Array) -> frozenset[str]:
+        """Arms of six joints whose Jacobian changes its sign while their tool is in a process, in a motion (N, nq)."""
+        crossing = set()
+        for task in self._cell.tasks:
+            columns = self._cell.columns(task.robot)
+            if task.name not in phase.tasks or task.process is None or columns.stop - columns.start != ARM:
+                continue
+            determinants = np.linalg.det(self._scene.chains[task.robot].flange_screws(q[:, columns]))
+            if determinants.min() < 0.0 < determinants.max():
+                crossing.add(task.robot)
+        return frozenset(crossing)
 
     def _paths_of(self, names: Sequence[str]) -> list[ClockedPath]:
         """Paths of some tasks, gone through once, in the order of the cell."""

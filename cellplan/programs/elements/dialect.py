@@ -4,7 +4,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from cellplan.model.report.exported import ExportFrame, ExportJob, Interpolation, ProgramRows, Promise, Targets
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell.cell import Robot
+from cellplan.model.report.exported import ExportFrame, ExportJob, Interpolation, Moves, ProgramRows, Promise
 from cellplan.model.settings.controllers import KindName
 
 SHARES: Final = (0.5, 0.35, 0.25, 0.15, 0.1, 0.05, 0.0)  # [-] of a segment, the largest first
@@ -46,7 +51,10 @@ class Dialect:
     split: int | None = None  # most rows of a file or routine; None for no limit
     shortest_time: float = 0.0  # shortest time in [s] between two rows that targets are known to keep; 0 for no limit
     is_proved: bool = False  # whether that time is documented by the maker, not only known from practice
-    targets: tuple[Targets, ...] = (Targets.JOINTS,)  # what rows can state
+    moves: tuple[Moves, ...] = (Moves.JOINTS,)  # how its programs can move tools where they work
+    # configuration of arms as its targets state it, for joints in [rad] or [m], shape (N, n) to (N, k); an
+    # ``InputError`` for an arm that has none. None where targets state none.
+    configuration: Callable[[Robot, Array], NDArray[np.int_]] | None = None
     # what its programs need of the cell, as calls that raise ``InputError`` where it is not there; all of them are made
     # before anything is computed
     demands: Demands = no_demands

@@ -8,7 +8,7 @@ from typing import Final
 from cellplan.errors import InputError, raise_findings
 from cellplan.files.input.findings import did_you_mean, listed
 from cellplan.model.cell.cell import Cell
-from cellplan.model.report.exported import Promise, Targets
+from cellplan.model.report.exported import Moves, Promise
 from cellplan.programs.elements.dialect import Dialect
 
 THIN_MM: Final = 0.05  # [mm] a tool or sliding joint, where rows may be left out and nothing is chosen
@@ -22,7 +22,7 @@ class Choice:
 
     Attributes:
         robots: Names of the robots; empty for all that the format plays.
-        targets: What rows state.
+        moves: How tools move where they work.
         split: Most rows of a file or routine; None for the limit of the format.
         thin_mm: How far a tool on the part, or a sliding joint, may be off in [mm] where rows are left out; None for
             what is usual.
@@ -31,7 +31,7 @@ class Choice:
     """
 
     robots: tuple[str, ...] = ()
-    targets: Targets = Targets.JOINTS
+    moves: Moves = Moves.JOINTS
     split: int | None = None
     thin_mm: float | None = None
     thin_deg: float | None = None
@@ -48,8 +48,12 @@ class Choice:
         Raises:
             InputError: It cannot.
         """
-        if self.targets not in dialect.targets:
-            raise InputError(f"--targets: expected {listed(dialect.targets)} with {dialect.name}, got {self.targets}")
+        if self.moves is Moves.LINEAR and self.moves not in dialect.moves:
+            raise InputError(f"--moves: expected {listed(dialect.moves)} with {dialect.name}, got {self.moves}")
+        if self.promise is Promise.PACED and self.moves is Moves.JOINTS:
+            raise InputError("--promise: expected --moves linear or auto with paced, got joints, which state no speed")
+        if self.moves is Moves.LINEAR and self.promise in {Promise.TIMED, Promise.SEQUENCE_ONLY}:
+            raise InputError(f"--promise: expected paced or synchronised with --moves linear, got {self.promise}")
         if self.promise is not None and self.promise not in dialect.promises:
             raise InputError(f"--promise: expected {listed(dialect.promises)} with {dialect.name}, got {self.promise}")
         if self.split is not None and dialect.split is None:

@@ -7,7 +7,7 @@ from typing import Final
 
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError, raise_findings, refusals
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise, Targets
+from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise
 from cellplan.model.report.verified_run import AnyRun, ReadRun, UnsolvedRun, VerifiedRun
 from cellplan.model.units import DEG, MM
 from cellplan.programs.elements.dialect import Dialect
@@ -19,10 +19,12 @@ from cellplan.programs.promises.orders import Orders
 from cellplan.programs.promises.promises import Promised, choose_promise, controllers_of
 from cellplan.programs.promises.run_programs import run_programs
 from cellplan.programs.promises.skew import RunSkew, run_skew
+from cellplan.programs.promises.stations import stations
 from cellplan.programs.rows.part_targets import with_part_poses
 from cellplan.programs.rows.resample import lead_time, resampled
 from cellplan.programs.rows.rows import essential_rows, full_rows
 from cellplan.programs.rows.thin import ThinningLimits, thinned
+from cellplan.programs.seams.choose import with_seams
 from cellplan.programs.shared import Shared
 
 FINER: Final = 0.3  # [-] of the usual thinning, where no rounding keeps the demands with that: it adds rows, not stops
@@ -58,15 +60,15 @@ def prepare(
     shared = shared or Shared(run)
     robots = exported_robots(run.cell, dialect, choice.robots)
     skew = run_skew(run) if Promise.TIMED in dialect.promises else None
-    promised = choose_promise(run, dialect, robots, skew=skew, requested=choice.promise)
+    promised = choose_promise(run, dialect, robots, skew=skew, requested=choice.promise, moves=choice.moves)
     frame = frame_of(run, robots, promised.promise, choice)
     raise_findings(unmet_demands(run, dialect, frame, choice))
-    has_waits = promised.promise is Promise.SEQUENCE_ONLY and len(run.cell.robots) > 1
+    has_waits = promised.promise.waits and len(run.cell.robots) > 1
     orders = shared.orders(progress) if has_waits else ()
     job, lead = _job(shared, dialect, choice, frame=frame, orders=orders)
     is_rounded = dialect.is_rounded and not is_at_cycle(dialect, frame.promise)
     stops, count = stops_left(job) if is_rounded else (0, 0)
-    if stops > FEW_STOPS * count and not choice.is_thinned:
+    if stops > FEW_STOPS * count and not choice.is_thinned and frame.promise is not Promise.PACED:
         finer = replace(choice, thin_mm=FINER * THIN_MM, thin_deg=FINER * THIN_DEG)
         other, _ = _job(shared, dialect, finer, frame=frame, orders=orders)
         job, choice = (other, finer) if stops_left(other)[0] < stops else (job, choice)
@@ -88,12 +90,17 @@ def _job(
 ) -> tuple[ExportJob, float]:
     """The rows of an export, rounded as far as the cell allows it; and by how much they are later."""
     programs, lead = _shaped(shared, dialect, choice, frame=frame, orders=orders)
-    if frame.targets is Targets.PART:
+    if frame.has_part_targets:
         programs = with_part_poses(frame, programs)
     job = ExportJob(frame=frame, programs=programs)
     if dialect.is_rounded and not is_at_cycle(dialect, frame.promise):
-        read = None if frame.targets is Targets.PART else dialect.read(frame, dialect.render(job))
+        as_poses = frame.has_part_targets or frame.promise is Promise.PACED
+        read = None if as_poses else dialect.read(frame, dialect.render(job))
         job = with_rounding(dialect, job, shared=shared, read=read, orders=orders, lead=lead)
+    if frame.promise is Promise.PACED:
+        full = _with_orders(full_rows(shared.run), orders)
+        most = (THIN_MM if choice.thin_mm is None else choice.thin_mm) / MM
+        job = with_seams(shared.scene, job, full, essential_rows(shared.run), most=most)
     return job, lead
 
 
@@ -104,8 +111,9 @@ def frame_of(run: AnyRun, robots: Sequence[str], promise: Promise, choice: Choic
         robots=tuple(robots),
         programs=tuple(program.name for program in run_programs(run)),
         promise=promise,
-        targets=choice.targets,
+        moves=choice.moves,
         split=choice.split,
+        stations=stations(run) if promise is Promise.PACED and not isinstance(run, UnsolvedRun) else {},
     )
 
 
@@ -126,7 +134,7 @@ def refuse_unfit(run: ReadRun | UnsolvedRun, dialect: Dialect, choice: Choice) -
         raise_findings(unmet)
     best = promise = choice.promise or dialect.promises[0]
     try:
-        best = choose_promise(run, dialect, robots, requested=choice.promise).promise
+        best = choose_promise(run, dialect, robots, requested=choice.promise, moves=choice.moves).promise
     except InputError as error:
         unmet += error.findings if isinstance(error, InvalidFileError) else [error]
     except NotVerifiedError as error:
@@ -144,7 +152,7 @@ def unmet_demands(run: AnyRun, dialect: Dialect, frame: ExportFrame, choice: Cho
         if choice.is_thinned:
             yield InputError(f"--thin-mm, --thin-deg: expected no thinning of a timed {dialect.name} program")
         yield from refusals(partial(lead_time, {robot.name: cycle_of(robot) for robot in frame.cell.robots}))
-    if frame.promise is Promise.SEQUENCE_ONLY:
+    if frame.promise.waits:
         yield from refusals(*(partial(require_signals, frame, robot.name) for robot in frame.cell.robots))
     rows = max((len(program.times) for program in run_programs(run)), default=0)
     yield from refusals(lambda: raise_findings(refusals(*dialect.demands(frame, rows))))
@@ -154,9 +162,7 @@ def _shaped(
     shared: Shared, dialect: Dialect, choice: Choice, *, frame: ExportFrame, orders: Sequence[Orders]
 ) -> tuple[tuple[ProgramRows, ...], float]:
     """Rows of the robots that are exported, with marks, as the format holds them; and by how much they are later."""
-    run, programs = shared.run, full_rows(shared.run)
-    if orders:
-        programs = tuple(_with_marks(program, order) for program, order in zip(programs, orders, strict=True))
+    run, programs = shared.run, _with_orders(full_rows(shared.run), orders)
     thinning = thinning_of(dialect, frame.promise, choice)
     if is_at_cycle(dialect, frame.promise):
         cycles = {robot.name: cycle_of(robot) for robot in run.cell.robots}  # all start and end together
@@ -193,6 +199,13 @@ def row_groups(frame: ExportFrame) -> list[list[str]]:
     for name, controller in controllers_of(frame.cell, frame.robots).items():
         groups.setdefault(controller, []).append(name)
     return list(groups.values())
+
+
+def _with_orders(programs: Sequence[ProgramRows], orders: Sequence[Orders]) -> tuple[ProgramRows, ...]:
+    """Programs whose robots wait for one another, where they do."""
+    if not orders:
+        return tuple(programs)
+    return tuple(_with_marks(program, order) for program, order in zip(programs, orders, strict=True))
 
 
 def _with_marks(program: ProgramRows, orders: Orders) -> ProgramRows:

@@ -31,7 +31,7 @@ def export_record(run: VerifiedRun, prepared: PreparedExport, written: Written) 
         "reasons": list(prepared.promised.reasons),
         "remarks": list(prepared.promised.remarks),
         "robots": list(frame.robots),
-        "targets": str(frame.targets),
+        "moves": str(frame.moves),
         "split": frame.split,
         "decimals": prepared.dialect.decimals,
         "allowed_skew": _skew(prepared),

@@ -10,12 +10,12 @@ from cellplan.files.input.files import digest, read_regular_file
 from cellplan.files.input.findings import did_you_mean, listed, shown
 from cellplan.files.input.json_reader import parse_json, required
 from cellplan.files.run.folder import EXPORT, MANIFEST
-from cellplan.model.report.exported import Promise, Targets
+from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import ReadRun, VerifiedRun
 from cellplan.programs.export.choice import Choice
 from cellplan.programs.export.record import SCHEMA
 
-Word = TypeVar("Word", Promise, Targets)
+Word = TypeVar("Word", Promise, Moves)
 
 SIZE_LIMIT: Final = 50_000_000  # [bytes] of a record: marks of many phases
 FILE_LIMIT: Final = 2_000_000_000  # [bytes] of a program
@@ -56,7 +56,7 @@ class StoredExport:
         is_requested = self.record.get("asked_promise") is not None
         return Choice(
             robots=tuple(str(name) for name in robots),
-            targets=self._one_of("targets", Targets),
+            moves=self._one_of("moves", Moves),
             split=split,
             thin_mm=mm,
             thin_deg=deg,

@@ -7,8 +7,10 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array, Flags
+from cellplan.geometry.transforms import rotation_vector
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows, Targets
+from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows
+from cellplan.model.units import DEG, MM
 from cellplan.programs.elements.corners import moves, row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.joints import Angle, from_numbers, to_numbers
@@ -18,6 +20,8 @@ TIME_ROUNDING: Final = 0.5e-3  # [s] formats write times with three decimals or 
 ROUNDING_TOL: Final = 1e-9  # [rad] or [m] arithmetic of units and zeros
 QUANTA: Final = 2.01  # [-] of the last decimal of a degree or millimetre: two axes that are coupled round by one each
 SHARE_TOL: Final = 0.02  # [-] zones are sizes, of segments between rows that are rounded; what is read is judged
+FEED_TOL: Final = 1e-6  # [m/s]
+SEAM_TURN: Final = 1e-2  # [deg] rounding of three angles, of which pendants hold two or three decimals
 SOLVED_TOL: Final = 1e-4  # [rad] or [m] positions that are worked out again from poses of tools
 
 
@@ -45,11 +49,45 @@ def _other(dialect: Dialect, job: ExportJob, written: RobotRows, read: RobotRows
     """The first difference between rows of one robot; None where they are the same."""
     if read.q.shape != written.q.shape:
         return f"expected {len(written)} rows of {written.q.shape[1]} joints, read {len(read)} of {read.q.shape[1]}"
-    if not np.all(np.isfinite(read.q)):
+    on_seam = written.on_seam
+    if not np.all(np.isfinite(read.q[~on_seam])):
         return "read a position that is not a finite number"
     if read.marks != written.marks:
         return f"expected waits at rows {list(written.marks)}, read {list(read.marks)}"
-    return _other_process(written, read) or _other_time(written, read) or _other_position(dialect, job, written, read)
+    return (
+        _other_process(written, read)
+        or _other_time(written, read)
+        or _other_seam(dialect, job, written, read)
+        or _other_position(dialect, job, written, read)
+    )
+
+
+def _other_seam(dialect: Dialect, job: ExportJob, written: RobotRows, read: RobotRows) -> str | None:
+    """The first row of a seam that is not as written: its pose, its speed, or whether an arc leads through it."""
+    if written.seams != read.seams:
+        return f"expected the seams {_shown(written)}, read {_shown(read)}"
+    if not written.seams or written.X_PT is None or written.feeds is None or written.middles is None:
+        return None
+    if read.X_PT is None or read.feeds is None or read.middles is None:
+        return "expected poses and speeds on seams, read none"
+    quantum = decimals_of(job.frame.robot(written.robot), dialect.decimals)
+    for row in np.flatnonzero(written.on_seam).tolist():
+        where, task = f"row {row + 1}", next(s.task for s in written.seams if s.first < row <= s.last)
+        off = MM * float(np.linalg.norm(read.X_PT[row, :3, 3] - written.X_PT[row, :3, 3]))
+        turned = DEG * float(np.linalg.norm(rotation_vector(read.X_PT[row, :3, :3].T @ written.X_PT[row, :3, :3])))
+        if not (off <= QUANTA * 10.0**-quantum and turned <= SEAM_TURN):
+            return f"{where}, task '{task}': read a pose that is {off:.3g} mm and {turned:.3g} deg from what is written"
+        if not abs(read.feeds[row] - written.feeds[row]) <= FEED_TOL:
+            expected, got = MM * written.feeds[row], MM * read.feeds[row]
+            return f"{where}, task '{task}': expected a speed of {expected:.6g} mm/s, read {got:.6g} mm/s"
+        if read.middles[row] != written.middles[row]:
+            return f"{where}, task '{task}': expected {'an arc' if written.middles[row] else 'a line'}, read the other"
+    return None
+
+
+def _shown(rows: RobotRows) -> str:
+    """Seams in messages."""
+    return ", ".join(f"{seam.task} at rows {seam.first + 1} to {seam.last + 1}" for seam in rows.seams) or "none"
 
 
 def _other_rounding(written: RobotRows, read: RobotRows, shares: Array) -> str | None:
@@ -88,7 +126,8 @@ def _other_time(written: RobotRows, read: RobotRows) -> str | None:
 def _other_position(dialect: Dialect, job: ExportJob, written: RobotRows, read: RobotRows) -> str | None:
     """The first position that is not as written."""
     robot = job.frame.robot(written.robot)
-    off = _off(robot, dialect, written.q, read.q, is_solved=job.frame.targets is Targets.PART)
+    off = _off(robot, dialect, written.q, read.q, is_solved=job.frame.has_part_targets)
+    off[written.on_seam] = False
     if not np.any(off):
         return None
     row, index = (int(place) for place in np.argwhere(off)[0])

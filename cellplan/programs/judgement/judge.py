@@ -59,6 +59,7 @@ def judge(
     job: ExportJob,
     read: tuple[ProgramRows, ...],
     *,
+    executed: Sequence[ProgramRows] | None = None,
     lead: float = 0.0,
     shared: Shared | None = None,
 ) -> Judgement:
@@ -71,6 +72,7 @@ def judge(
     times of the rows that were written: no tool is then farther from its desired path than from the desired pose.
 
     Args:
+        executed: What was read with its seams as controllers execute them; None for programs without seams.
         lead: Time in [s] by which the rows are later than those of the run, see ``resample.lead_time``.
         shared: What exports of the run share: rows that are played alike, to the last bit, are judged once.
     """
@@ -79,7 +81,7 @@ def judge(
         return Judgement(findings=tuple(findings))
     with without_cache():
         shared, deviations, corners = shared or Shared(run), list[Deviation](), list[Deviation]()
-        programs = list(played_programs(run, dialect, job, read, lead=lead))
+        programs = list(played_programs(run, dialect, job, read if executed is None else executed, lead=lead))
         for played in programs:
             new_findings, new_deviations, new_corners = _judged_once(played, shared, dialect, job)
             findings += new_findings
@@ -100,10 +102,11 @@ def played_programs(
     """The programs as targets play them."""
     by_name = {program.name: program for program in full_rows(run)}
     for written, recovered in zip(job.programs, read, strict=True):
+        is_executed = any(rows.tube is not None for rows in recovered.robots.values())
         yield ExecutedProgram.of(
             run,
             by_name[written.name],
-            (recovered, written),
+            (recovered, recovered if is_executed else written),
             shares=row_shares(job, written),
             interpolation=dialect.interpolation,
             lead=lead,
@@ -129,7 +132,7 @@ def _program_findings(
     """Everything that is judged of one program."""
     yield from position_findings(played)
     promise = job.frame.promise
-    if promise is not Promise.SEQUENCE_ONLY:
+    if not promise.waits:
         is_played = _is_played(dialect, promise)
         yield from joint_findings(played, accelerations=is_played)
         if is_played:
@@ -259,7 +262,9 @@ def _largest(deviations: Iterable[Deviation]) -> tuple[Deviation, ...]:
 
 def _not_judged(dialect: Dialect, job: ExportJob, read: Sequence[ProgramRows]) -> Iterator[str]:
     """What holds of the run but not of the files alone."""
-    if job.frame.promise is Promise.SEQUENCE_ONLY:
+    if job.frame.promise is Promise.PACED:
+        yield "accelerations, and speeds and loads off the seams: the controllers choose their own"
+    elif job.frame.promise is Promise.SEQUENCE_ONLY:
         yield "speeds, accelerations, feeds and loads: the controllers choose their own times"
     elif not _is_played(dialect, job.frame.promise):
         yield "accelerations, jerk, feeds and loads: the controllers plan their own profile from row to row"

@@ -1,7 +1,7 @@
 """Where the tools, further holders and bodies of a played program are: against all that its cell demands of them."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
@@ -27,7 +27,15 @@ from cellplan.model.motion.motion import Clock, Schedule, TaskSchedule
 from cellplan.model.report.report import Check, ClosureAccuracy, TaskAccuracy, ToolDepth
 from cellplan.model.task.task import Task
 from cellplan.model.units import MM
-from cellplan.programs.rows.margins import all_corners, in_steps, off_chords, raised, tool_corners, tool_margins
+from cellplan.programs.rows.margins import (
+    all_corners,
+    in_steps,
+    off_chords,
+    raised,
+    tool_corners,
+    tool_margins,
+    tubes_at,
+)
 from cellplan.programs.rows.played import ExecutedProgram, ExecutedStretch
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -49,6 +57,9 @@ class PathRows:
     # how far all joints may be off together at each time by rounding, with sign, shape (M, nq); see
     # ``margins.corners_at``
     corners: Array
+    # how far tools and joints may be from the straight motion on seams in each step, shape (M - 1, 2 + n), by robot; see
+    # ``margins.tubes_at``
+    tubes: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def stacked(self) -> Array:
@@ -58,7 +69,15 @@ class PathRows:
     @property
     def is_off(self) -> bool:
         """Whether joints may be off the straight motion at all."""
-        return bool(np.any(self.off) or np.any(self.corners))
+        return bool(self.tubes or np.any(self.off) or np.any(self.corners))
+
+    @property
+    def joints_off(self) -> Array:
+        """How far all joints may be off in each step, in [rad] or [m], shape (M - 1, nq)."""
+        off = self.off + in_steps(self.corners)
+        for name, tube in self.tubes.items():
+            off[:, self.scene.cell.columns(name)] += tube[:, 2:]
+        return off
 
     def tool_off(self, relation: Relation) -> Array:
         """By how much a tool may be off on the part at each time in [m], and turned in [rad], shape (M, 2).
@@ -67,6 +86,11 @@ class PathRows:
         """
         deviations = np.zeros((len(self.times), 2))
         if not self.is_off:
+            return deviations
+        if relation.robot in self.tubes:
+            steps = np.pad(self.tubes[relation.robot][:, :2], ((1, 1), (0, 0)))
+            deviations += np.maximum(steps[:-1], steps[1:])
+        if not (np.any(self.off) or np.any(self.corners)):
             return deviations
         arms = LeverArms(self.scene, self.stacked)
         if np.any(self.off):
@@ -93,6 +117,7 @@ def path_rows(played: ExecutedProgram, stretch: ExecutedStretch, scene: Scene) -
         is_break=played.is_break(times),
         off=off_chords(played, times),
         corners=all_corners(played, times),
+        tubes=tubes_at(played, times),
     )
 
 
@@ -232,7 +257,7 @@ def _demanding(rows: PathRows) -> Scene:
     scene = scene_of_run(rows.scene, [scheduled.task.name for scheduled in rows.schedule.tasks])
     if not rows.is_off:
         return scene
-    return raised(LeverArms(scene, rows.stacked), scene, rows.off + in_steps(rows.corners))
+    return raised(LeverArms(scene, rows.stacked), scene, rows.joints_off)
 
 
 def schedule_at(schedule: Schedule, times: Array) -> Schedule:

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.files.input.findings import listed
 from cellplan.model.cell.cell import Cell
-from cellplan.model.report.exported import Promise
+from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import AnyRun
 from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.model.task.task import Service
@@ -17,7 +17,7 @@ from cellplan.programs.elements.joints import Axes
 from cellplan.programs.promises.run_programs import moving_robots, run_programs, spoilt_by_another_order
 from cellplan.programs.promises.skew import PER_SECOND, ClockPair, RunSkew, skew_text
 
-BEST_FIRST: Final = (Promise.TIMED, Promise.SYNCHRONISED, Promise.SEQUENCE_ONLY)
+BEST_FIRST: Final = (Promise.TIMED, Promise.SYNCHRONISED, Promise.PACED, Promise.SEQUENCE_ONLY)
 LAGGING: Final = {"stream": frozenset({"ur", "abb"})}  # servoj and EGM follow 0.03 to 0.2 s late
 ONE_CLOCK: Final = "timed for one controller; several controllers agree only to their start skew"
 
@@ -47,6 +47,7 @@ class _Export:
     robots: tuple[str, ...]
     skew: RunSkew | None
     requested: Promise | None
+    moves: Moves
 
     @property
     def promises(self) -> tuple[Promise, ...]:
@@ -71,27 +72,31 @@ def choose_promise(
     *,
     skew: RunSkew | None = None,
     requested: Promise | None = None,
+    moves: Moves = Moves.JOINTS,
 ) -> Promised:
     """The best promise that a format can keep for some robots of a run, or the one that is asked for.
 
     Args:
         skew: How far the starts of controllers may be apart; None where it is unknown, or there is one only.
         requested: The only promise that will do; None for the best.
+        moves: How tools move where they work; ``paced`` takes lines and arcs.
 
     Raises:
         InputError: None can be kept, as something is not stated in the cell.
         NotVerifiedError: None can be kept with this motion; the first line says why not the least one that the format
             can hold, indented ones say why not the better ones.
     """
-    export = _Export(run=run, dialect=dialect, robots=tuple(robots), skew=skew, requested=requested)
+    export = _Export(run=run, dialect=dialect, robots=tuple(robots), skew=skew, requested=requested, moves=moves)
     failures: dict[Promise, _Against] = {}
     for promise in BEST_FIRST:
+        if promise is Promise.PACED and (moves is Moves.JOINTS or promise not in dialect.promises):
+            continue  # joints have no speed of a tool
         against = _against(export, promise)
         if against is None:
             reasons = tuple(f"not {better}: {reason.text}" for better, reason in failures.items())
             return Promised(promise=promise, reasons=reasons, remarks=tuple(_remarks(export, promise)))
         failures[promise] = against
-    unstated = [failures[promise].text for promise in export.promises if failures[promise].is_input]
+    unstated = [against.text for against in failures.values() if against.is_input]
     if unstated:
         raise InvalidFileError([InputError(text) for text in unstated])
     *better, last = [promise for promise in failures if promise in export.promises]
@@ -135,11 +140,13 @@ def _against(export: _Export, promise: Promise) -> _Against | None:
     if export.requested is not None and promise is not export.requested:
         return _Against(f"'{export.requested}' was asked for")
     match promise:
+        case Promise.TIMED if export.moves is not Moves.JOINTS and Promise.PACED in export.dialect.promises:
+            return _Against("lines and arcs of a tool have no times")
         case Promise.TIMED:
             return _against_timed(export)
         case Promise.SYNCHRONISED:
             return _against_synchronised(export)
-        case Promise.SEQUENCE_ONLY:
+        case Promise.PACED | Promise.SEQUENCE_ONLY:
             return _against_sequence(export)
 
 
@@ -205,6 +212,11 @@ def _remarks(export: _Export, promise: Promise) -> Iterator[str]:
                 yield from _unmet(export)
         case Promise.SYNCHRONISED:
             yield "same row at the same time within the blend zones; the controller may take longer than planned"
+            yield from _stays(export)
+        case Promise.PACED:
+            yield "on seams the tool moves at the programmed speed; times between robots are not kept"
+            yield "accelerations are those of the controllers and are not judged"
+            yield from _unwritten(cell)
             yield from _stays(export)
         case Promise.SEQUENCE_ONLY:
             yield "the controller makes the speed between rows: times and feeds of the plan are not kept"

@@ -5,7 +5,7 @@ controller holds has a frame that goes with the flange of this robot, whether it
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, inverse, rotation_vector
 from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.report.exported import Station
 from cellplan.model.report.verified_run import ReadRun, VerifiedRun
 from cellplan.model.task.task import Frame, Task
 from cellplan.programs.elements.frames import controller_base, on_flange
@@ -21,26 +22,6 @@ from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 SAME_TOL: Final = 1e-6  # [m] and [rad] within which poses of a part are one
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Station:
-    """A frame in which tools of a robot work.
-
-    Attributes:
-        tasks: Names of the tasks, in the order of work.
-        number: Its number on the controller; None where none is stated.
-        holder: Name of the robot of the same controller whose flange moves it; None for a fixed frame.
-        X: The part in the base of the controller, or in the flange of the holder as the controller has it, in [m]; None
-            where another controller moves the part while the tool works, so that no frame has it.
-        X_W: A fixed frame in the world in [m]; None for any other.
-    """
-
-    tasks: tuple[str, ...]
-    number: int | None = None
-    holder: str | None = None
-    X: Array | None = None
-    X_W: Array | None = None
 
 
 def stations(run: VerifiedRun | ReadRun) -> dict[str, tuple[Station, ...]]:

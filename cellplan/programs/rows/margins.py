@@ -32,6 +32,8 @@ from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 
 SHORTEST: Final = 1e-6  # [s] between two rows
+FIRST: Final = ((0, 1), (0, 0))  # steps at the rows at which they begin
+LAST: Final = ((1, 0), (0, 0))  # and end
 
 
 def corner_vectors(rows: RobotRows, shares: Array) -> Array:
@@ -79,8 +81,29 @@ def all_corners(played: ExecutedProgram, times: Array) -> Array:
 
 
 def robot_corners(played: ExecutedProgram) -> dict[str, Array]:
-    """How far each exported robot may be off at its rows by rounding, in [rad] or [m], shape (N, n), by robot."""
-    return {name: np.abs(corner_vectors(played.rows[name], played.shares[name])) for name in played.exported}
+    """How far each exported robot may be off at its rows: by rounding, and in its tube.
+
+    In [rad] or [m], shape (N, n), by robot.
+    """
+    corners = {}
+    for name in played.exported:
+        rows = played.rows[name]
+        corners[name] = np.abs(corner_vectors(rows, played.shares[name]))
+        if rows.tube is not None:
+            corners[name] += np.max([np.pad(rows.tube[:, 2:], ends) for ends in (FIRST, LAST)], axis=0)
+    return corners
+
+
+def tubes_at(played: ExecutedProgram, times: Array) -> dict[str, Array]:
+    """The tube of each robot that has one, in each step between times in [s], shape (M,), shape (M - 1, 2 + n)."""
+    middle = 0.5 * (times[:-1] + times[1:])
+    tubes = {}
+    for name in played.exported:
+        rows = played.rows[name]
+        if rows.tube is not None:
+            step = np.searchsorted(times_of(rows), middle, side="right") - 1
+            tubes[name] = rows.tube[np.clip(step, 0, len(rows.tube) - 1)]
+    return tubes
 
 
 def off_chords(played: ExecutedProgram, times: Array) -> Array:

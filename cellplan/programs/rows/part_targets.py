@@ -223,7 +223,7 @@ def _with_joints(frame: ExportFrame, program: ProgramRows, rows: RobotRows, writ
     first = written.q[at].copy()
     external = list(Axes.of(robot).external)
     first[:, external] = rows.q[at][:, external]
-    solutions, misses = _solved(ScrewChain(robot), X_WT, first, arm=list(Axes.of(robot).arm))
+    solutions, misses = solved_joints(ScrewChain(robot), X_WT, first, arm=list(Axes.of(robot).arm))
     far = (misses > POSE_TOL) | (np.max(np.abs(solutions - first), axis=1) > STEP_TOL)
     if np.any(far):
         place = int(at[np.argmax(far)])
@@ -240,19 +240,29 @@ def _with_joints(frame: ExportFrame, program: ProgramRows, rows: RobotRows, writ
     return replace(rows, q=q)
 
 
-def _solved(chain: ScrewChain, X_WT: Array, first: Array, *, arm: list[int]) -> tuple[Array, Array]:
-    """Joints that bring a tool to poses, shape (N, n), and by how much they miss them in [m] or [rad], shape (N,)."""
+def tip_jacobians(chain: ScrewChain, q: Array) -> Array:
+    """Twists of a tool at its tip in the world for each joint, linear part first, shape (N, 6, n)."""
+    X, screws = chain.tool_motion(q)
+    J = screws.copy()  # its linear part at the origin of the world, then at the tool tip
+    J[:, :3] += np.swapaxes(np.cross(np.swapaxes(J[:, 3:], 1, 2), X[:, None, :3, 3]), 1, 2)
+    return J
+
+
+def solved_joints(chain: ScrewChain, X_WT: Array, first: Array, *, arm: list[int]) -> tuple[Array, Array]:
+    """Joints that bring a tool to poses, shape (N, n), and by how much they miss them in [m] or [rad], shape (N,).
+
+    Newton's method moves the joints ``arm`` from the ``first`` ones, shape (N, n).
+    """
     q, misses = first.copy(), np.full(len(first), np.inf)
     for _ in range(ITERATIONS):
-        X, screws = chain.tool_motion(q)
+        X = chain.tool_poses(q)
         offset = X_WT[:, :3, 3] - X[:, :3, 3]
         turn = rotation_vector(X_WT[:, :3, :3] @ np.swapaxes(X[:, :3, :3], 1, 2))
         error = np.concatenate([offset, turn], axis=1)
         misses = np.max(np.abs(error), axis=1)
         if np.all(misses <= 0.1 * POSE_TOL):
             break
-        J = screws[:, :, arm].copy()  # its linear part at the origin of the world, then at the tool tip
-        J[:, :3] += np.swapaxes(np.cross(np.swapaxes(J[:, 3:], 1, 2), X[:, None, :3, 3]), 1, 2)
+        J = tip_jacobians(chain, q)[:, :, arm]
         J_T = np.swapaxes(J, 1, 2)
         q[:, arm] += (J_T @ np.linalg.solve(J @ J_T + DAMPING * np.eye(6), error[..., None]))[..., 0]
     return q, misses

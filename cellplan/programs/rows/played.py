@@ -66,7 +66,10 @@ class ExecutedProgram:
             if name in read.robots:
                 one, other = read.robots[name], written.robots[name]
                 times, qd = (other.times if one.times is None else one.times), one.qd
-                rows[name] = RobotRows(robot=name, q=one.q, times=times, qd=qd, process=other.process, marks=one.marks)
+                process = other.process if one.tube is None else one.process
+                rows[name] = RobotRows(
+                    robot=name, q=one.q, times=times, qd=qd, process=process, marks=one.marks, tube=one.tube
+                )
             else:
                 one = full.robots[name]
                 rows[name] = RobotRows(robot=name, q=one.q, times=times_of(one) + lead)

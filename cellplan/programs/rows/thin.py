@@ -69,7 +69,7 @@ def thinned(
     _split_by_tools(scene, program, sets, work=essential_rows.work)
     chosen = {rows.robot: one.chosen for one in sets for rows in one.rows}
     thinned_rows = {
-        name: _chosen_rows(scene, rows, chosen[name]) for name, rows in program.robots.items() if name in chosen
+        name: chosen_rows(scene, rows, chosen[name]) for name, rows in program.robots.items() if name in chosen
     }
     return replace(program, robots=thinned_rows)
 
@@ -190,7 +190,7 @@ def _split_by_tools(
                 group.split_by_tools(tools, phase.rows, full, np.array(count))
 
 
-def _chosen_rows(scene: Scene, rows: RobotRows, chosen: Indices) -> RobotRows:
+def chosen_rows(scene: Scene, rows: RobotRows, chosen: Indices) -> RobotRows:
     """Some rows of a robot, with the speeds and marks that belong to them."""
     model = scene.cell.robot(rows.robot).model
     times, q, qd = times_of(rows)[chosen], rows.q[chosen], None

@@ -7,7 +7,7 @@ from typing import Final
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ExportFrame, Promise, Targets
+from cellplan.model.report.exported import ExportFrame, Promise
 from cellplan.model.settings.controllers import RobotControlEntry
 from cellplan.model.task.task import Frame
 from cellplan.programs.elements.frames import on_flange
@@ -102,7 +102,7 @@ def works_on_part(frame: ExportFrame, robot: str) -> bool:
     cell = frame.cell
     tasks = [task for task in cell.tasks if task.robot == robot and task.relative_to is Frame.PART]
     return (
-        frame.targets is Targets.PART
+        frame.has_part_targets
         and bool(tasks)
         and robot not in cell.positioners
         and bool(Axes.of(frame.robot(robot)).arm)
@@ -115,19 +115,15 @@ def part_frame(frame: ExportFrame) -> PartFrame | None:
     The holder's flange carries the part without moving in it, so its work object states no user frame, and the part in
     its flange as object frame: ``X_GP = inv(X_FG) X_FT X_TP`` of the holder.
 
-    ``InputError`` where no robot of the export carries the part, or the robots are not synchronised.
+    ``InputError`` where no robot of the export carries the part.
     """
-    if frame.targets is not Targets.PART:
+    if not frame.has_part_targets:
         return None
-    if frame.promise is not Promise.SYNCHRONISED:
-        raise InputError(
-            f"--targets part: expected robots that one controller moves together, got programs that are {frame.promise}"
-        )
     if not frame.cell.part.held_by:
-        raise InputError("--targets part: expected a part that a robot holds, got one that is fixed in the world")
+        raise InputError("--moves linear: expected a part that a robot holds, got one that is fixed in the world")
     holder = frame.cell.part.held_by[0].robot
     if holder not in frame.robots:
-        raise InputError(f"--targets part: expected '{holder}', which holds the part, among the exported robots")
+        raise InputError(f"--moves linear: expected '{holder}', which holds the part, among the exported robots")
     task, placed = rapid_task(frame, holder), frame.robot(holder)
     unit = frame.cell.controllers[_control(frame, holder).id].tasks[task]
     return PartFrame(unit=unit, X_GP=on_flange(placed, placed.tool.X_FT @ frame.cell.part.X_CP))

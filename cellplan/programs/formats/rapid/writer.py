@@ -26,10 +26,10 @@ from cellplan.model.report.exported import (
     ExportFrame,
     ExportJob,
     Interpolation,
+    Moves,
     ProgramRows,
     Promise,
     RobotRows,
-    Targets,
 )
 from cellplan.model.units import MM
 from cellplan.programs.elements.corners import chosen_shares, moves, row_shares
@@ -101,7 +101,7 @@ def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
         yield partial(rapid_units, replace(frame, robots=(name,), promise=Promise.SEQUENCE_ONLY))
         if frame.promise is Promise.SYNCHRONISED:
             yield partial(rapid_task, frame, name)
-        elif frame.promise is Promise.SEQUENCE_ONLY:
+        elif frame.promise.waits:
             yield partial(_require_names, frame, name)
         if works_on_part(frame, name):
             robot = frame.robot(name)
@@ -264,7 +264,7 @@ RAPID: Final = Dialect(
     is_rounded=True,
     split=LINES,
     demands=_demands,
-    targets=(Targets.JOINTS, Targets.PART),
+    moves=tuple(Moves),
 )
 
 

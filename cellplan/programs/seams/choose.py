@@ -1,0 +1,256 @@
+"""Seams chosen from a run: few lines and arcs that follow a tool, where the part rests while it works."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cellplan.errors import NotVerifiedError
+from cellplan.geometry.transforms import Array, inverse, rotation_vector
+from cellplan.measures.tool_errors import error_lengths, part_poses
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.exported import ExportJob, Moves, ProgramRows, RobotRows, Seam
+from cellplan.model.task.task import Frame, Task
+from cellplan.programs.elements.corners import LARGEST_SHARE, switches
+from cellplan.programs.rows.part_targets import LEFT_OVER
+from cellplan.programs.rows.rows import EssentialRows, WorkRows, times_of
+from cellplan.programs.rows.thin import chosen_rows
+from cellplan.programs.seams.shapes import STANDS, Shape, arc, corner_cut, line
+from cellplan.runs.plan.program import STILL_TOL
+from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.scene import Scene
+
+MOST_SPIN: Final = np.deg2rad(3.0)  # [rad] by which a tool may leave its orientation in the run where it is free
+ROUNDING_SHARE: Final = 0.25  # [-] of the tolerance that a corner in process may be cut by
+MOST_TURN: Final = np.deg2rad(0.02)  # [rad] that a corner may be cut by
+SLOWEST: Final = 1e-4  # [m/s] a tool that is slower turns rather than moves
+TURNS: Final = np.deg2rad(0.1)  # [rad] a tool that stands and turns by less moves on no line
+FEED_STEP: Final = 1e-4  # [m/s] to which speeds are rounded up where no feed is stated
+
+
+class Piece(NamedTuple):
+    """A line or an arc that follows a tool between two rows."""
+
+    last: int  # the row at which it ends; it begins where the one before it ends
+    middle: int | None  # the row through which an arc leads
+    shape: Shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ToolPath:
+    """The path of a tool in the frame of a part that rests."""
+
+    task: Task
+    X_PT: Array  # its poses at all rows of a phase in [m], shape (N, 4, 4)
+    most: float  # how far a tool may be off its path by rows left out, in [m]
+
+    def pieces(self, kept: Sequence[int]) -> Iterator[Piece]:
+        """The longest lines and arcs, one after the other, which end at the rows that are kept, increasing."""
+        first = kept[0]
+        for end in kept[1:]:
+            while first < end:
+                piece = max(
+                    (self._longest(first, end, is_arc=is_arc) for is_arc in (False, True)), key=lambda one: one.last
+                )
+                yield piece
+                first = piece.last
+
+    def stands(self, first: int, last: int) -> bool:
+        """Whether the tool rests between two rows."""
+        off = np.abs(self.X_PT[first : last + 1] - self.X_PT[first])
+        return bool(off[:, :3, 3].max() < STANDS and off[:, :3, :3].max() < TURNS)
+
+    def _longest(self, first: int, end: int, *, is_arc: bool) -> Piece:
+        """The longest line or arc from a row on, by bisection; one step of the run is a line."""
+        low, high = Piece(first + 1, None, line(*self.X_PT[[first, first + 1]])), end + 1
+        trial = end
+        while trial > low.last:
+            piece = self._piece(first, trial, is_arc=is_arc)
+            low, high = (piece, high) if piece is not None else (low, trial)
+            trial = (low.last + high) // 2
+        return low
+
+    def _piece(self, first: int, last: int, *, is_arc: bool) -> Piece | None:
+        """The line or the arc between two rows; None where it does not follow the tool."""
+        X, middle = self.X_PT[first : last + 1], None
+        shape: Shape | None = line(X[0], X[-1])
+        if is_arc:
+            travel = np.cumsum(np.linalg.norm(np.diff(X[:, :3, 3], axis=0), axis=1))
+            middle = 1 + int(np.searchsorted(travel, 0.5 * travel[-1]))
+            shape = arc(X[0], X[middle], X[-1]) if 0 < middle < last - first else None
+        if shape is None or not self._follows(shape, X):
+            return None
+        return Piece(last, None if middle is None else first + middle, shape)
+
+    def _follows(self, shape: Shape, X: Array) -> bool:
+        """Whether a shape keeps a tool as near to its poses in the run, shape (N, 4, 4), as is allowed."""
+        shares = shape.shares(X[:, :3, 3])
+        if shape.length < STANDS and np.linalg.norm(shape.turn) > TURNS:
+            return False
+        poses = shape.poses(np.maximum.accumulate(shares))
+        errors = error_lengths(poses, X, self.task)
+        position, orientation = self.task.tolerance.between
+        turns = np.linalg.norm(rotation_vector(poses[:, :3, :3] @ np.swapaxes(X[:, :3, :3], 1, 2)), axis=1)
+        return bool(
+            errors[:, 0].max() <= min(self.most, LEFT_OVER * position)
+            and errors[:, 1].max() + shape.rule_margin <= LEFT_OVER * orientation
+            and turns.max() <= MOST_SPIN
+        )
+
+
+def with_seams(
+    scene: Scene, job: ExportJob, full: Sequence[ProgramRows], essential: Sequence[EssentialRows], *, most: float
+) -> ExportJob:
+    """A job whose robots move their tools on lines and arcs wherever these work on a part that rests.
+
+    Args:
+        job: Rows of joints, some left out, with their marks and their rounding.
+        full: All rows of its programs, with the same marks.
+        essential: The phases of its programs.
+        most: How far a tool may be off its path by rows left out, in [m].
+
+    Raises:
+        NotVerifiedError: The moves are to be linear, and a part moves while a tool works on it.
+    """
+    programs = []
+    for program, every, phases in zip(job.programs, full, essential, strict=True):
+        robots = {
+            name: _seams_of(scene, job, (rows, every), phases.work, most=most) for name, rows in program.robots.items()
+        }
+        programs.append(replace(program, robots=robots))
+    return replace(job, programs=tuple(programs))
+
+
+def reference_pose(cell: Cell, chains: Mapping[str, ScrewChain], task: Task, q: Mapping[str, Array]) -> Array:
+    """The frame in which a task is given, in the world, shape (4, 4), for joints of all robots, shape (n,)."""
+    if task.relative_to is Frame.WORLD:
+        return np.eye(4)
+    return part_poses(cell, chains, {name: positions[None] for name, positions in q.items()})[0]
+
+
+def _seams_of(
+    scene: Scene, job: ExportJob, given: tuple[RobotRows, ProgramRows], work: Sequence[WorkRows], *, most: float
+) -> RobotRows:
+    """The rows of one robot, with its seams; ``given`` are those of its joints, and all of the program."""
+    thinned, every = given
+    rows = every.robots[thinned.robot]
+    chosen = set(np.searchsorted(times_of(rows), times_of(thinned)).tolist())
+    rounding = dict(zip(sorted(chosen), _shares(job, thinned), strict=True))
+    poses: dict[int, Array] = {}
+    feeds: dict[int, float] = {}
+    middles: set[int] = set()
+    seams: list[tuple[str, int, int]] = []
+    for phase in work:
+        path = _path(scene, job, every, thinned.robot, phase, most)
+        if path is None:
+            continue
+        first, last = phase.rows.start, min(phase.rows.stop, len(rows)) - 1
+        chosen -= set(range(first + 1, last))
+        pieces = list(path.pieces(_kept_rows(path, rows, first, last)))
+        ends = [0, *(piece.last for piece in pieces)]
+        for begin, piece in zip(ends, pieces, strict=False):
+            through = [] if piece.middle is None else [first + piece.middle]
+            feed = _feed(path, rows, (first, begin, piece.last))
+            for row in (*through, first + piece.last):
+                poses[row], feeds[row], rounding[row] = path.X_PT[row - first], feed, 0.0
+            middles.update(through)
+        for row, share in zip(ends[1:-1], _cuts(path, pieces), strict=True):
+            is_switch = switches(rows)[first + row] or first + row in rows.marks
+            rounding[first + row] = 0.0 if is_switch else share
+        seams.append((path.task.name, first, last))
+    return _assembled(scene, rows, sorted(chosen | set(poses)), poses, feeds, rounding, middles, seams)
+
+
+def _path(
+    scene: Scene, job: ExportJob, every: ProgramRows, robot: str, phase: WorkRows, most: float
+) -> ToolPath | None:
+    """The path of the tool of a robot in a phase; None where it has no task there, or moves its joints."""
+    task = next((phase.cell.task(name) for name in phase.tasks if phase.cell.task(name).robot == robot), None)
+    if task is None:
+        return None
+    q = {name: rows.q[phase.rows] for name, rows in every.robots.items()}
+    holders = phase.cell.part.held_by if task.relative_to is Frame.PART else ()
+    for holder in holders:
+        if np.any(np.abs(q[holder.robot] - q[holder.robot][0]) > STILL_TOL):
+            if job.frame.moves is Moves.LINEAR:
+                raise NotVerifiedError(
+                    [f"--moves linear: '{holder.robot}' moves the part while the tool of task '{task.name}' works"]
+                )
+            return None
+    start = {name: positions[0] for name, positions in q.items()}
+    X_PW = inverse(reference_pose(phase.cell, scene.chains, task, start))
+    return ToolPath(task=task, X_PT=X_PW @ scene.chains[robot].tool_poses(q[robot]), most=most)
+
+
+def _kept_rows(path: ToolPath, rows: RobotRows, first: int, last: int) -> list[int]:
+    """Rows of a phase at which lines and arcs end, counted from its first: waits, switches of the process, corners."""
+    inside = range(first + 1, last)
+    needed = {first, last, *(row for row in rows.marks if row in inside)}
+    needed |= set((first + np.flatnonzero(switches(rows)[first : last + 1])).tolist())
+    corners = [row for row in rows.stops if row in inside and row not in needed]
+    kept = sorted(needed)
+    for row in corners:
+        before, after = max(r for r in kept if r < row), min(r for r in kept if r > row)
+        if not path.stands(before - first, row - first) and not path.stands(row - first, after - first):
+            kept = sorted([*kept, row])
+    return [row - first for row in kept]
+
+
+def _feed(path: ToolPath, rows: RobotRows, between: tuple[int, int, int]) -> float:
+    """Speed of a tool in [m/s] between two rows of a phase: what its task states, or the greatest of the run."""
+    start, first, last = between
+    if path.task.feed is not None and rows.process is not None and rows.process[start + first]:
+        return path.task.feed
+    steps = np.linalg.norm(np.diff(path.X_PT[first : last + 1, :3, 3], axis=0), axis=1)
+    speed = float(np.max(steps / np.diff(times_of(rows)[start + first : start + last + 1])))
+    return max(float(np.ceil(speed / FEED_STEP - 1e-6)) * FEED_STEP, SLOWEST)
+
+
+def _cuts(path: ToolPath, pieces: Sequence[Piece]) -> Iterator[float]:
+    """Share of the shorter neighbouring piece within which each inner row may be rounded.
+
+    A small corner is cut by as much less as its ends are nearer to it.
+    """
+    allowed = ROUNDING_SHARE * path.task.tolerance.between[0]
+    for one, other in pairwise(pieces):
+        shorter = min(one.shape.length, other.shape.length)
+        if shorter < STANDS:
+            yield 0.0
+            continue
+        cut, turn = corner_cut(one.shape, other.shape, LARGEST_SHARE * shorter)
+        yield LARGEST_SHARE / max(cut / allowed, float(np.linalg.norm(turn)) / MOST_TURN, 1.0)
+
+
+def _shares(job: ExportJob, rows: RobotRows) -> list[float]:
+    """Shares within which rows of joints are rounded."""
+    return (np.full(len(rows), job.blend) if rows.rounding is None else rows.rounding).tolist()
+
+
+def _assembled(
+    scene: Scene,
+    rows: RobotRows,
+    chosen: Sequence[int],
+    poses: Mapping[int, Array],
+    feeds: Mapping[int, float],
+    rounding: Mapping[int, float],
+    middles: set[int],
+    seams: Sequence[tuple[str, int, int]],
+) -> RobotRows:
+    """Chosen rows with what was found of their seams."""
+    few = chosen_rows(scene, rows, np.array(chosen))
+    if not seams:
+        return replace(few, rounding=np.array([rounding[row] for row in chosen]))
+    place = {row: index for index, row in enumerate(chosen)}
+    inside = [row for _, first, last in seams for row in range(place[first], place[last] + 1)]
+    return replace(
+        few,
+        qd=None,
+        stops=tuple(row for row in few.stops if row not in inside),
+        rounding=np.array([rounding[row] for row in chosen]),
+        X_PT=np.array([poses.get(row, np.full((4, 4), np.nan)) for row in chosen]),
+        feeds=np.array([feeds.get(row, np.nan) for row in chosen]),
+        middles=np.array([row in middles for row in chosen]),
+        seams=tuple(Seam(task=task, first=place[first], last=place[last]) for task, first, last in seams),
+    )

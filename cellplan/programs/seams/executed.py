@@ -1,0 +1,298 @@
+r"""Seams as controllers execute them: rows of joints along each line and arc, and a tube round these.
+
+A controller moves the tool straight, or on a circle, in a frame of the part and finds the joints as it goes, from those
+at which the seam was entered. The rows are such joints at the places that the tool passes in the run. How far a tool may
+be from the even motion between these is its *tube*: what the joints bend off the line between two rows, what the rules of
+orientation differ, what a rounded corner cuts, and what a controller's own weave and sensors add. The tube of the joints
+follows from that of the tool, :math:`|\delta q_i| \le |J^{-1}_{i,v}| \epsilon_p + |J^{-1}_{i,\omega}| \epsilon_r`.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError, NotVerifiedError
+from cellplan.geometry.transforms import Array, inverse, rotation_vector
+from cellplan.model.cell.cell import Robot
+from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows, Seam
+from cellplan.model.units import MM
+from cellplan.programs.elements.corners import row_shares
+from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.frames import controller_base, on_flange
+from cellplan.programs.elements.joints import Axes
+from cellplan.programs.rows.part_targets import POSE_TOL, solved_joints, tip_jacobians
+from cellplan.programs.rows.rows import times_of
+from cellplan.programs.seams.shapes import STANDS, Shape, arc, corner_cut, line
+from cellplan.scene.kinematics.screw_chain import ScrewChain
+
+LARGEST_STEP: Final = 0.05  # [rad] or [m] of a joint from row to row; more is a singular configuration that is passed
+BENT: Final = 2.0  # [-] of what joints are off a line in the middle of a step: their largest deviation in it
+RESERVE: Final = 1.2  # [-] of a Jacobian that changes within the tube
+EDGE: Final = 2e-5  # [rad] from the edge of a configuration within which either of its sides is right
+SPEED_TOL: Final = 1e-3  # [-] of a speed limit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SeamPath:
+    """The path of a tool along one line or arc, and the joints on it."""
+
+    shape: Shape
+    shares: Array  # shares of its length at the rows, rising from 0 to 1, shape (M,)
+    times: Array  # times of the rows in [s], shape (M,)
+    q: Array  # joints there in [rad] or [m], shape (M, n)
+    tube: Array  # of the tool in [m] and [rad] and of the joints in each step, shape (M - 1, 2 + n)
+
+
+class SeamExecution:
+    """The seams of one robot in a program that was read, as its controller executes them."""
+
+    def __init__(
+        self, frame: ExportFrame, full: ProgramRows, read: ProgramRows, rows: RobotRows, *, dialect: Dialect
+    ) -> None:
+        """Take what a reader found, and the run, whose rows say which branch of the joints is meant."""
+        self._frame, self._rows, self._dialect = frame, rows, dialect
+        self._robot: Robot = frame.robot(rows.robot)
+        self._chain = ScrewChain(self._robot)
+        self._full, self._read = full, read
+
+    @cached_property
+    def _run_rows(self) -> tuple[Array, Array]:
+        """Times and joints of the robot in the run."""
+        rows = self._full.robots[self._rows.robot]
+        return times_of(rows), rows.q
+
+    def rows(self) -> RobotRows:
+        """The rows of joints with their tube; ``NotVerifiedError`` where a seam cannot be executed as it is stated."""
+        if not self._rows.seams:
+            return self._rows
+        rows, count = self._rows, len(self._robot.model.joints)
+        times, inside = times_of(rows), {seam.first: seam for seam in rows.seams}
+        pieces: list[tuple[Array, Array, Array]] = [(times[:1], rows.q[:1], np.zeros((0, 2 + count)))]
+        places = [0]
+        row = 1
+        while row < len(rows):
+            seam = inside.get(row - 1)
+            if seam is None:
+                pieces.append((times[row : row + 1], rows.q[row : row + 1], np.zeros((1, 2 + count))))
+                places.append(places[-1] + 1)
+                row += 1
+                continue
+            for at, path in self._seam(seam, pieces[-1][1][-1]):
+                pieces.append((path.times[1:], path.q[1:], path.tube))
+                while len(places) <= at:  # an intermediate point of an arc counts with its end
+                    places.append(places[-1] + (len(path.times) - 1 if len(places) == at else 0))
+            row = seam.last + 1
+        return self._executed(pieces, np.array(places))
+
+    def _executed(self, pieces: Sequence[tuple[Array, Array, Array]], places: Array) -> RobotRows:
+        """Rows of all pieces; ``places`` are those of the rows that were read."""
+        times, q, tube = (np.concatenate(columns) for columns in zip(*pieces, strict=True))
+        rows = self._rows
+        process, rounding = np.zeros(len(times), dtype=bool), np.zeros(len(times))
+        if rows.process is not None:
+            steps = np.searchsorted(places, np.arange(len(times)), side="right") - 1
+            process = rows.process[steps]
+        is_joint = np.ones(len(rows), dtype=bool) if rows.X_PT is None else np.isnan(rows.X_PT[:, 0, 0])
+        if rows.rounding is not None:
+            rounding[places[is_joint]] = rows.rounding[is_joint]
+        marks = tuple(places[list(rows.marks)].tolist())
+        return RobotRows(robot=rows.robot, q=q, times=times, process=process, marks=marks, rounding=rounding, tube=tube)
+
+    def _seam(self, seam: Seam, q_entry: Array) -> Iterator[tuple[int, SeamPath]]:
+        """The lines and arcs of a seam with the rows at which they end, from the joints at which it is entered."""
+        rows = self._rows
+        if rows.X_PT is None or rows.feeds is None:
+            raise InputError(f"robot '{rows.robot}': expected poses and speeds of the seam of '{seam.task}', got none")
+        X_WP = self._part_pose(seam)
+        X, travelled, q = inverse(X_WP) @ self._chain.tool_poses(q_entry[None])[0], 0.0, q_entry
+        first = seam.first
+        paths: list[tuple[int, SeamPath]] = []
+        while first < seam.last:
+            is_arc = rows.middles is not None and bool(rows.middles[first + 1])
+            last = first + 1 + is_arc
+            end = rows.X_PT[last]
+            shape = arc(X, rows.X_PT[first + 1], end) if is_arc else line(X, end)
+            if shape is None:
+                raise NotVerifiedError([f"task '{seam.task}': row {last}: no arc of at most 120 deg leads through it"])
+            path = self._path(seam, (first, last), shape, X_WP, (q, travelled))
+            paths.append((last, path))
+            self._require_configuration(seam, last, path.q[-1:], MM * (travelled + shape.length))
+            X, travelled, q, first = end, travelled + shape.length, path.q[-1], last
+        yield from self._with_corners(seam, paths)
+
+    def _part_pose(self, seam: Seam) -> Array:
+        """The frame of a seam in the world, as its controller has it, shape (4, 4)."""
+        station = self._frame.station(self._rows.robot, seam.task)
+        if station.X is None:
+            raise InputError(f"task '{seam.task}': expected a part that rests, or moves with a robot of the controller")
+        if station.holder is None:
+            return controller_base(self._robot) @ station.X
+        holder = self._frame.robot(station.holder)
+        rows = self._read.robots.get(station.holder, self._full.robots[station.holder])
+        times = self._full.robots[station.holder].times if rows.times is None else rows.times
+        at = 0.5 * float(np.sum(times_of(self._rows)[[seam.first, seam.last]]))
+        q = np.array([np.interp(at, times, column) for column in rows.q.T])  # type: ignore[arg-type]
+        return ScrewChain(holder).flange_poses(q[None])[0] @ inverse(on_flange(holder, np.eye(4))) @ station.X
+
+    def _path(
+        self, seam: Seam, rows: tuple[int, int], shape: Shape, X_WP: Array, begin: tuple[Array, float]
+    ) -> SeamPath:
+        """One line or arc between two rows, from some joints and a length of the seam."""
+        (first, last), (q_entry, travelled) = rows, begin
+        ends = times_of(self._rows)[[first, last]]
+        run_times, run_q = self._run_rows
+        inner = (run_times > ends[0] + STANDS) & (run_times < ends[1] - STANDS)
+        times = np.concatenate([ends[:1], run_times[inner], ends[1:]])
+        near = np.stack([np.interp(times, run_times, column) for column in run_q.T], axis=1)
+        shares = shape.shares((inverse(X_WP) @ self._chain.tool_poses(near))[:, :3, 3])
+        shares[0], shares[-1] = 0.0, 1.0
+        shares = np.maximum.accumulate(shares)
+        arm, external = list(Axes.of(self._robot).arm), list(Axes.of(self._robot).external)
+        if external and shape.length > STANDS:
+            end_q = self._rows.q[last, external]
+            near[:, external] = q_entry[external] + shares[:, None] * (end_q - q_entry[external])
+        X_WT = X_WP @ shape.poses(shares)
+        q, misses = solved_joints(self._chain, X_WT, near, arm=arm)
+        q[0] = q_entry
+        places = MM * (travelled + shares * shape.length)
+        self._require_reached(seam, q, misses, places)
+        self._require_limits(seam, q, places, feed=float(self._rows.feeds[last]), lengths=shares * shape.length)  # type: ignore[index]
+        return SeamPath(shape=shape, shares=shares, times=times, q=q, tube=self._tube(shape, shares, q, X_WP))
+
+    def _require_reached(self, seam: Seam, q: Array, misses: Array, places: Array) -> None:
+        """The tool meets every pose of a line, and no joint jumps on the way: the branch is the one continued."""
+        steps = np.abs(np.diff(q, axis=0))
+        jumps, missed = np.any(steps > LARGEST_STEP, axis=1), misses[1:] > 10.0 * POSE_TOL
+        if np.any(jumps | missed):
+            step = int(np.argmax(jumps | missed))
+            joint = self._robot.model.joints[int(np.argmax(steps[step]))].name
+            raise NotVerifiedError(
+                [
+                    f"task '{seam.task}', {places[step + 1]:.1f} mm along its seam: no continuous motion of the joints "
+                    f"follows the line, which passes near a singular configuration: joint {joint} of '{self._robot.name}'"
+                ]
+            )
+
+    def _require_configuration(self, seam: Seam, row: int, q: Array, place: float) -> None:
+        """The configuration that was read with a pose is that of the joints; at an edge either side of it is right."""
+        read, function = self._rows.configuration, self._dialect.configuration
+        if read is None or function is None:
+            return
+        near = [function(self._robot, q + turn)[0] for turn in (-EDGE, 0.0, EDGE)]
+        if not np.all(np.any(np.equal(near, read[row]), axis=0)):
+            raise NotVerifiedError(
+                [
+                    f"task '{seam.task}', {place:.1f} mm along its seam: expected configuration {near[1].tolist()}, in "
+                    f"which '{self._robot.name}' comes there, got {read[row].tolist()}"
+                ]
+            )
+
+    def _require_limits(self, seam: Seam, q: Array, places: Array, *, feed: float, lengths: Array) -> None:
+        """No joint leaves its limits, nor moves faster than it may while the tool moves at its speed."""
+        model = self._robot.model
+        beyond = np.maximum(model.lower - q, q - model.upper)
+        where = f"task '{seam.task}'"
+        if np.any(beyond > POSE_TOL):
+            row, index = (int(place) for place in np.unravel_index(np.argmax(beyond), beyond.shape))
+            unit, scale = model.joints[index].display_unit
+            raise NotVerifiedError(
+                [
+                    f"{where}, {places[row]:.1f} mm along its seam: joint {model.joints[index].name} of "
+                    f"'{self._robot.name}' leaves its limits by {scale * float(beyond[row, index]):.3g} {unit}"
+                ]
+            )
+        moved = np.diff(lengths)
+        rates = np.abs(np.diff(q, axis=0))[moved > STANDS] * (feed / moved[moved > STANDS])[:, None]
+        limits = model.velocity
+        if rates.size and np.any(rates > (1.0 + SPEED_TOL) * limits):
+            row, index = (int(place) for place in np.unravel_index(np.argmax(rates / limits), rates.shape))
+            unit, scale = model.joints[index].display_unit
+            raise NotVerifiedError(
+                [
+                    f"{where}, {places[1:][moved > STANDS][row]:.1f} mm along its seam: joint "
+                    f"{model.joints[index].name} of '{self._robot.name}' would move at "
+                    f"{scale * float(rates[row, index]):.4g} {unit}/s at {MM * feed:.4g} mm/s, allowed "
+                    f"{scale * float(limits[index]):.4g}"
+                ]
+            )
+
+    def _tube(self, shape: Shape, shares: Array, q: Array, X_WP: Array) -> Array:
+        """The tube of every step, without corners, shape (M - 1, 2 + n)."""
+        middle = shape.poses(0.5 * (shares[:-1] + shares[1:]))
+        X = inverse(X_WP) @ self._chain.tool_poses(0.5 * (q[:-1] + q[1:]))
+        off = np.linalg.norm(X[:, :3, 3] - middle[:, :3, 3], axis=1)
+        turned = np.linalg.norm(rotation_vector(X[:, :3, :3] @ np.swapaxes(middle[:, :3, :3], 1, 2)), axis=1)
+        rules = shape.rule_margins(shares)
+        tool = np.stack([BENT * off, BENT * turned + np.maximum(rules[:-1], rules[1:])], axis=1)
+        return np.concatenate([tool, self._joints_off(tool, q)], axis=1)
+
+    def _joints_off(self, tool: Array, q: Array) -> Array:
+        """How far joints may be off in each step for what a tool is, shape (M - 1, 2), shape (M - 1, n)."""
+        arm, off = list(Axes.of(self._robot).arm), np.zeros((len(tool), q.shape[1]))
+        J_inverse = np.abs(np.linalg.pinv(tip_jacobians(self._chain, q[1:])[:, :, arm]))
+        reach = np.stack([np.linalg.norm(J_inverse[:, :, part], axis=2) for part in (slice(3), slice(3, 6))], axis=2)
+        off[:, arm] = RESERVE * np.einsum("mik,mk->mi", reach, tool)
+        return off
+
+    def _with_corners(self, seam: Seam, paths: Sequence[tuple[int, SeamPath]]) -> Iterator[tuple[int, SeamPath]]:
+        """The pieces of a seam with what rounded corners between them cut, added to their tubes."""
+        rounding = self._rows.rounding
+        widened = [path.tube.copy() for _, path in paths]
+        for place, (row, path) in enumerate(paths[:-1]):
+            share = 0.0 if rounding is None else float(rounding[row])
+            if share <= 0.0:
+                continue
+            other = paths[place + 1][1]
+            axis = self._rows.X_PT[row, :3, 2]  # type: ignore[index]
+            radius = share * min(path.shape.length, other.shape.length)
+            cut, turn = corner_cut(path.shape, other.shape, radius)
+            is_free = self._frame.cell.task(seam.task).is_spin_free
+            seen = turn - axis * float(turn @ axis) if is_free else turn
+            on_tool, on_joints = (np.array([cut, np.linalg.norm(turned)]) for turned in (seen, turn))
+            for piece, near in (
+                (place, (1.0 - path.shares) * path.shape.length <= radius),
+                (place + 1, other.shares * other.shape.length <= radius),
+            ):
+                steps = near[:-1] | near[1:]
+                q = paths[piece][1].q
+                widened[piece][steps, :2] += on_tool
+                widened[piece][steps, 2:] += self._joints_off(np.tile(on_joints, (len(q) - 1, 1)), q)[steps]
+        for (row, path), tube in zip(paths, widened, strict=True):
+            yield row, replace(path, tube=tube)
+
+
+def executed_programs(
+    job: ExportJob, dialect: Dialect, full: Sequence[ProgramRows], read: Sequence[ProgramRows]
+) -> tuple[ProgramRows, ...]:
+    """Programs that were read, their seams as controllers execute them, at the times of the job that was written.
+
+    Raises:
+        InputError: A seam has no frame, or no speed.
+        NotVerifiedError: A line cannot be followed by the joints: with the task, the length along its seam and the joint.
+    """
+    by_name: Mapping[str | None, ProgramRows] = {program.name: program for program in full}
+    programs = []
+    for meant, found in zip(job.programs, read, strict=True):
+        shares = row_shares(job, meant)
+        timed = {
+            name: replace(
+                rows,
+                times=meant.robots[name].times if rows.times is None else rows.times,
+                rounding=shares[name] if rows.rounding is None else rows.rounding,
+            )
+            for name, rows in found.robots.items()
+        }
+        timed_program = replace(found, robots=timed)
+        programs.append(
+            replace(
+                found,
+                robots={
+                    name: SeamExecution(job.frame, by_name[found.name], timed_program, rows, dialect=dialect).rows()
+                    for name, rows in timed.items()
+                },
+            )
+        )
+    return tuple(programs)
