@@ -20,7 +20,7 @@ from builders.scene_builders import arm_model, held_part, work
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Robot, Tool
-from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows, Targets
+from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, ProgramRows, Promise, RobotRows
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry
 
@@ -116,7 +116,7 @@ def part_job(
         robots=tuple(robots),
         programs=(None,),
         promise=Promise.SYNCHRONISED,
-        targets=Targets.PART,
+        moves=Moves.LINEAR,
     )
     job = ExportJob(frame=frame, programs=(ProgramRows(name=None, robots=robots),), notes=("on the part",))
     return replace(job, **changes)  # type: ignore[arg-type]

@@ -14,7 +14,7 @@ from builders.scene_builders import arm_model, fixed_part, placed
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import Array, pose_from, quaternion_to_rotation, rotation_exp
-from cellplan.model.report.exported import ExportJob, ProgramRows, Promise
+from cellplan.model.report.exported import ExportJob, ProgramRows
 from cellplan.programs.elements.conventions import quaternions
 from cellplan.programs.formats.rapid.targets import configuration
 from cellplan.programs.formats.rapid.writer import RAPID
@@ -190,17 +190,7 @@ def test_a_part_that_no_robot_holds_is_refused() -> None:
     cell = replace(job.frame.cell, part=fixed_part(Box((0.1, 0.1, 0.1)), np.eye(4)))
 
     assert refusal(replace(job, frame=replace(job.frame, cell=cell))) == (
-        "--targets part: expected a part that a robot holds, got one that is fixed in the world"
-    )
-
-
-def test_robots_that_are_not_in_step_are_refused() -> None:
-    job = part_job()
-
-    text = refusal(replace(job, frame=replace(job.frame, promise=Promise.SEQUENCE_ONLY)))
-
-    assert text == (
-        "--targets part: expected robots that one controller moves together, got programs that are sequence only"
+        "--moves linear: expected a part that a robot holds, got one that is fixed in the world"
     )
 
 
@@ -209,7 +199,7 @@ def test_a_holder_that_is_not_exported_is_refused() -> None:
 
     text = refusal(replace(job, frame=replace(job.frame, robots=NAMES[:2])))
 
-    assert text == "--targets part: expected 'gamma', which holds the part, among the exported robots"
+    assert text == "--moves linear: expected 'gamma', which holds the part, among the exported robots"
 
 
 def test_a_cell_without_a_task_on_the_part_is_refused() -> None:
@@ -217,7 +207,7 @@ def test_a_cell_without_a_task_on_the_part_is_refused() -> None:
 
     text = refusal(replace(job, frame=replace(job.frame, cell=replace(job.frame.cell, tasks=()))))
 
-    assert text == "--targets part: expected a robot with an arm and a task on the part, got none"
+    assert text == "--moves linear: expected a robot with an arm and a task on the part, got none"
 
 
 @pytest.mark.parametrize(

@@ -13,13 +13,10 @@ from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.notes import export_notes
 from cellplan.programs.export.prepare import PreparedExport, is_at_cycle
-from cellplan.programs.judgement.compare_rows import other_rows
 from cellplan.programs.judgement.judge import Judgement, judge, played_programs
 from cellplan.programs.promises.orders import certify_written
 from cellplan.programs.rows.margins import robot_corners
 from cellplan.programs.rows.part_targets import joints_of_part_poses
-from cellplan.programs.rows.rows import full_rows
-from cellplan.programs.seams.executed import executed_programs
 
 STAGE: Final = "checking what was written"
 RATIO_NOISE: Final = 1e-9  # [-] of a step that is the cycle of a controller
@@ -66,19 +63,13 @@ def judged(
     if prepared.job.frame.has_part_targets:
         read = joints_of_part_poses(prepared.job.frame, prepared.job.programs, read)
     progress(STAGE, 0.0)
-    executed = None
-    if has_seams(prepared.job) and not any(other_rows(prepared.dialect, prepared.job, read)):
-        executed = executed_programs(prepared.job, prepared.dialect, full_rows(run), read)
-    judgement = judge(
-        run, prepared.dialect, prepared.job, read, executed=executed, lead=prepared.lead, shared=prepared.shared
-    )
+    judgement = judge(run, prepared.dialect, prepared.job, read, lead=prepared.lead, shared=prepared.shared)
     progress(STAGE, 1.0)
     findings = list(judgement.findings)
     if not findings and prepared.orders:
-        rows = read if executed is None else executed
-        played = played_programs(run, prepared.dialect, prepared.job, rows, lead=prepared.lead)
+        played = played_programs(run, prepared.dialect, prepared.job, judgement.executed, lead=prepared.lead)
         corners = [robot_corners(program) for program in played]
-        findings += certify_written(run, prepared.orders, rows, corners, progress=progress)
+        findings += certify_written(run, prepared.orders, judgement.executed, corners, progress=progress)
     if findings:
         named = [f"{prepared.dialect.name}: {finding}" for finding in findings]
         raise NotVerifiedError([*named, *_unresolved(run, prepared, named), *_stated_coarsely(run, prepared)])
@@ -107,11 +98,6 @@ def _stated_coarsely(run: VerifiedRun, prepared: PreparedExport) -> Iterator[str
         if len(set(cycles.values())) > 1:
             shown = " and ".join(f"{1e3 * cycle:g} ms of {name}" for name, cycle in cycles.items())
             yield f"  cycle_ms: {shown}: holders of one part that share a cycle strain it less between rows"
-
-
-def has_seams(job: ExportJob) -> bool:
-    """Whether a robot of a job has seams."""
-    return any(rows.seams for program in job.programs for rows in program.robots.values())
 
 
 def same_rows(one: Sequence[ProgramRows], other: Sequence[ProgramRows]) -> bool:

@@ -66,22 +66,29 @@ def _other_seam(dialect: Dialect, job: ExportJob, written: RobotRows, read: Robo
     """The first row of a seam that is not as written: its pose, its speed, or whether an arc leads through it."""
     if written.seams != read.seams:
         return f"expected the seams {_shown(written)}, read {_shown(read)}"
-    if not written.seams or written.X_PT is None or written.feeds is None or written.middles is None:
-        return None
+    decimals = decimals_of(job.frame.robot(written.robot), dialect.decimals)
+    for seam in written.seams:
+        for row in range(seam.first + 1, seam.last + 1):
+            finding = _other_move(written, read, row, quantum=QUANTA * 10.0**-decimals)
+            if finding is not None:
+                return f"row {row + 1}, task '{seam.task}': {finding}"
+    return None
+
+
+def _other_move(written: RobotRows, read: RobotRows, row: int, *, quantum: float) -> str | None:
+    """What differs of a line or an arc to a row; its place may differ by so much in [mm]."""
+    if written.X_PT is None or written.feeds is None or written.middles is None:
+        raise ValueError(f"rows of '{written.robot}': expected poses and speeds of their seams")
     if read.X_PT is None or read.feeds is None or read.middles is None:
-        return "expected poses and speeds on seams, read none"
-    quantum = decimals_of(job.frame.robot(written.robot), dialect.decimals)
-    for row in np.flatnonzero(written.on_seam).tolist():
-        where, task = f"row {row + 1}", next(s.task for s in written.seams if s.first < row <= s.last)
-        off = MM * float(np.linalg.norm(read.X_PT[row, :3, 3] - written.X_PT[row, :3, 3]))
-        turned = DEG * float(np.linalg.norm(rotation_vector(read.X_PT[row, :3, :3].T @ written.X_PT[row, :3, :3])))
-        if not (off <= QUANTA * 10.0**-quantum and turned <= SEAM_TURN):
-            return f"{where}, task '{task}': read a pose that is {off:.3g} mm and {turned:.3g} deg from what is written"
-        if not abs(read.feeds[row] - written.feeds[row]) <= FEED_TOL:
-            expected, got = MM * written.feeds[row], MM * read.feeds[row]
-            return f"{where}, task '{task}': expected a speed of {expected:.6g} mm/s, read {got:.6g} mm/s"
-        if read.middles[row] != written.middles[row]:
-            return f"{where}, task '{task}': expected {'an arc' if written.middles[row] else 'a line'}, read the other"
+        return "expected a pose and a speed, read none"
+    off = MM * float(np.linalg.norm(read.X_PT[row, :3, 3] - written.X_PT[row, :3, 3]))
+    turned = DEG * float(np.linalg.norm(rotation_vector(read.X_PT[row, :3, :3].T @ written.X_PT[row, :3, :3])))
+    if not (off <= quantum and turned <= SEAM_TURN):
+        return f"read a pose that is {off:.3g} mm and {turned:.3g} deg from what is written"
+    if not abs(read.feeds[row] - written.feeds[row]) <= FEED_TOL:
+        return f"expected a speed of {MM * written.feeds[row]:.6g} mm/s, read {MM * read.feeds[row]:.6g} mm/s"
+    if read.middles[row] != written.middles[row]:
+        return f"expected {'an arc through it' if written.middles[row] else 'a line'}, read the other"
     return None
 
 

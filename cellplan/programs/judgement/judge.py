@@ -19,6 +19,7 @@ from cellplan.programs.judgement.judge_speeds import joint_findings, motion_find
 from cellplan.programs.rows.part_targets import ToolsOnPart
 from cellplan.programs.rows.played import ExecutedProgram, ExecutedStretch
 from cellplan.programs.rows.rows import full_rows
+from cellplan.programs.seams.executed import executed_programs
 from cellplan.programs.shared import Shared, played_digest
 from cellplan.scene.scene import Scene
 
@@ -46,6 +47,7 @@ class Judgement:
     not_judged: tuple[str, ...] = ()  # what does not hold on the files alone, with the reason
     corners: tuple[Deviation, ...] = ()  # by how much rounded rows may put tools off, of every task
     rounded: tuple[int, int] = (0, 0)  # rows of all robots that are rounded, and all rows of them
+    executed: tuple[ProgramRows, ...] = ()  # what was read, its seams as controllers execute them
 
     @property
     def passed(self) -> bool:
@@ -59,7 +61,6 @@ def judge(
     job: ExportJob,
     read: tuple[ProgramRows, ...],
     *,
-    executed: Sequence[ProgramRows] | None = None,
     lead: float = 0.0,
     shared: Shared | None = None,
 ) -> Judgement:
@@ -72,16 +73,18 @@ def judge(
     times of the rows that were written: no tool is then farther from its desired path than from the desired pose.
 
     Args:
-        executed: What was read with its seams as controllers execute them; None for programs without seams.
         lead: Time in [s] by which the rows are later than those of the run, see ``resample.lead_time``.
         shared: What exports of the run share: rows that are played alike, to the last bit, are judged once.
     """
     findings = list(other_rows(dialect, job, read))
     if findings:
         return Judgement(findings=tuple(findings))
+    executed = read
+    if any(rows.seams for program in job.programs for rows in program.robots.values()):
+        executed = executed_programs(job, dialect, full_rows(run), read)
     with without_cache():
         shared, deviations, corners = shared or Shared(run), list[Deviation](), list[Deviation]()
-        programs = list(played_programs(run, dialect, job, read if executed is None else executed, lead=lead))
+        programs = list(played_programs(run, dialect, job, executed, lead=lead))
         for played in programs:
             new_findings, new_deviations, new_corners = _judged_once(played, shared, dialect, job)
             findings += new_findings
@@ -93,6 +96,7 @@ def judge(
         not_judged=tuple(_not_judged(dialect, job, read)),
         corners=_largest(corners),
         rounded=_rounded(programs),
+        executed=executed,
     )
 
 
@@ -120,7 +124,9 @@ def _judged_once(
 
     def judgement() -> tuple[tuple[str, ...], tuple[Deviation, ...], tuple[Deviation, ...]]:
         findings = tuple(_program_findings(played, shared.scenes, dialect, job))
-        return findings, tuple(_deviations(played, shared.scenes)), tuple(_corners(played, shared.scenes))
+        is_timed = job.frame.promise is not Promise.PACED  # or else joints pass their places at times of their own
+        deviations = tuple(_deviations(played, shared.scenes, of_joints=is_timed))
+        return findings, deviations, tuple(_corners(played, shared.scenes))
 
     promise = job.frame.promise
     return shared.once((played_digest(played), promise, _is_played(dialect, promise), job.blend), judgement)
@@ -182,7 +188,7 @@ def _is_same(one: Mapping[str, Array], other: Mapping[str, Array]) -> bool:
     return all(one[name].shape == other[name].shape and np.all(np.abs(one[name] - other[name]) <= SAME) for name in one)
 
 
-def _deviations(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[Deviation]:
+def _deviations(played: ExecutedProgram, scenes: Sequence[Scene], *, of_joints: bool) -> Iterator[Deviation]:
     """How far a program is from the rows of the run, between which joints move evenly."""
     run = played.run
     times = played.grid(0.0, played.end)
@@ -191,7 +197,7 @@ def _deviations(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[De
         name: np.stack([np.interp(times, played.run_times, column) for column in table.q.T], axis=1)
         for name, table in tables.items()
     }
-    for name in played.exported:
+    for name in played.exported if of_joints else ():
         off = np.abs(of_program[name] - of_run[name])
         for index, joint in enumerate(run.cell.robot(name).model.joints):
             row, (unit, scale) = int(np.argmax(off[:, index])), joint.display_unit

@@ -57,7 +57,7 @@ class PathRows:
     # how far all joints may be off together at each time by rounding, with sign, shape (M, nq); see
     # ``margins.corners_at``
     corners: Array
-    # how far tools and joints may be from the straight motion on seams in each step, shape (M - 1, 2 + n), by robot; see
+    # how far tools and joints may be from straight motion on seams in each step, shape (M - 1, 2 + n), by robot; see
     # ``margins.tubes_at``
     tubes: Mapping[str, Array] = field(default_factory=dict)
 

@@ -115,7 +115,7 @@ def with_part_poses(frame: ExportFrame, programs: Sequence[ProgramRows]) -> tupl
     """
     part_frame(frame)
     if not any(works_on_part(frame, name) for name in frame.robots):
-        raise InputError("--targets part: expected a robot with an arm and a task on the part, got none")
+        raise InputError("--moves linear: expected a robot with an arm and a task on the part, got none")
     return tuple(
         replace(
             program,

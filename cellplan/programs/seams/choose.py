@@ -1,7 +1,7 @@
 """Seams chosen from a run: few lines and arcs that follow a tool, where the part rests while it works."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final, NamedTuple
 
@@ -24,6 +24,8 @@ from cellplan.scene.scene import Scene
 
 MOST_SPIN: Final = np.deg2rad(3.0)  # [rad] by which a tool may leave its orientation in the run where it is free
 ROUNDING_SHARE: Final = 0.25  # [-] of the tolerance that a corner in process may be cut by
+THIN_TURN: Final = np.deg2rad(0.05)  # [rad] that a turning joint may be off the path of a transfer
+THIN_SLIDE: Final = 5e-5  # [m] that a sliding joint may, likewise
 MOST_TURN: Final = np.deg2rad(0.02)  # [rad] that a corner may be cut by
 SLOWEST: Final = 1e-4  # [m/s] a tool that is slower turns rather than moves
 TURNS: Final = np.deg2rad(0.1)  # [rad] a tool that stands and turns by less moves on no line
@@ -46,10 +48,10 @@ class ToolPath:
     X_PT: Array  # its poses at all rows of a phase in [m], shape (N, 4, 4)
     most: float  # how far a tool may be off its path by rows left out, in [m]
 
-    def pieces(self, kept: Sequence[int]) -> Iterator[Piece]:
-        """The longest lines and arcs, one after the other, which end at the rows that are kept, increasing."""
-        first = kept[0]
-        for end in kept[1:]:
+    def pieces(self, ends: Sequence[int]) -> Iterator[Piece]:
+        """The longest lines and arcs, one after the other, which end at some rows, increasing."""
+        first = ends[0]
+        for end in ends[1:]:
             while first < end:
                 piece = max(
                     (self._longest(first, end, is_arc=is_arc) for is_arc in (False, True)), key=lambda one: one.last
@@ -130,37 +132,100 @@ def reference_pose(cell: Cell, chains: Mapping[str, ScrewChain], task: Task, q: 
     return part_poses(cell, chains, {name: positions[None] for name, positions in q.items()})[0]
 
 
-def _seams_of(
-    scene: Scene, job: ExportJob, given: tuple[RobotRows, ProgramRows], work: Sequence[WorkRows], *, most: float
-) -> RobotRows:
-    """The rows of one robot, with its seams; ``given`` are those of its joints, and all of the program."""
-    thinned, every = given
-    rows = every.robots[thinned.robot]
-    chosen = set(np.searchsorted(times_of(rows), times_of(thinned)).tolist())
-    rounding = dict(zip(sorted(chosen), _shares(job, thinned), strict=True))
-    poses: dict[int, Array] = {}
-    feeds: dict[int, float] = {}
-    middles: set[int] = set()
-    seams: list[tuple[str, int, int]] = []
-    for phase in work:
-        path = _path(scene, job, every, thinned.robot, phase, most)
-        if path is None:
-            continue
-        first, last = phase.rows.start, min(phase.rows.stop, len(rows)) - 1
-        chosen -= set(range(first + 1, last))
-        pieces = list(path.pieces(_kept_rows(path, rows, first, last)))
+@dataclass(kw_only=True, eq=False)
+class _SeamRows:
+    """The rows of one robot while its seams are chosen, by their number among all rows of the program."""
+
+    scene: Scene
+    rows: RobotRows  # all rows
+    chosen: set[int]  # those that stay
+    rounding: dict[int, float]  # share of the shorter neighbouring segment of each
+    poses: dict[int, Array] = field(default_factory=dict)  # of rows on seams, in the frame of the part
+    feeds: dict[int, float] = field(default_factory=dict)  # speed of the tool to them in [m/s]
+    middles: set[int] = field(default_factory=set)  # intermediate points of arcs
+    seams: list[tuple[str, int, int]] = field(default_factory=list)  # task, first and last row
+
+    def follow(self, path: ToolPath, first: int, last: int) -> None:
+        """Follow the tool on lines and arcs from one row to another."""
+        self.chosen -= set(range(first + 1, last))
+        pieces = list(path.pieces(_piece_ends(path, self.rows, first, last)))
         ends = [0, *(piece.last for piece in pieces)]
         for begin, piece in zip(ends, pieces, strict=False):
             through = [] if piece.middle is None else [first + piece.middle]
-            feed = _feed(path, rows, (first, begin, piece.last))
+            feed = _feed(path, self.rows, (first, begin, piece.last))
             for row in (*through, first + piece.last):
-                poses[row], feeds[row], rounding[row] = path.X_PT[row - first], feed, 0.0
-            middles.update(through)
+                self.poses[row], self.feeds[row], self.rounding[row] = path.X_PT[row - first], feed, 0.0
+            self.middles.update(through)
         for row, share in zip(ends[1:-1], _cuts(path, pieces), strict=True):
-            is_switch = switches(rows)[first + row] or first + row in rows.marks
-            rounding[first + row] = 0.0 if is_switch else share
-        seams.append((path.task.name, first, last))
-    return _assembled(scene, rows, sorted(chosen | set(poses)), poses, feeds, rounding, middles, seams)
+            is_stop = switches(self.rows)[first + row] or first + row in self.rows.marks
+            self.rounding[first + row] = 0.0 if is_stop else share
+        self.seams.append((path.task.name, first, last))
+
+    def straighten(self, first: int, last: int) -> None:
+        """Leave out rows that the path of the joints does not need, whatever their times, as robots wait at marks.
+
+        Rows stay rounded within the same distance: their shares are made smaller as segments become longer.
+        """
+        inside = sorted(row for row in self.chosen if first <= row <= last)
+        joints = self.scene.cell.robot(self.rows.robot).model.joints
+        scaled = self.rows.q[inside] / np.array([THIN_TURN if joint.is_revolute else THIN_SLIDE for joint in joints])
+        needed = [k for k, row in enumerate(inside) if row in self.rows.marks or switches(self.rows)[row]]
+        ends = {0, len(inside) - 1, *needed}
+        stretches = list(pairwise(sorted(ends)))
+        while stretches:
+            begin, end = stretches.pop()
+            chord, offset = scaled[end] - scaled[begin], scaled[begin + 1 : end] - scaled[begin]
+            share = np.clip(offset @ chord / max(float(chord @ chord), STANDS), 0.0, 1.0)
+            off = np.abs(offset - share[:, None] * chord).max(axis=1, initial=0.0)
+            if off.max(initial=0.0) > 1.0:
+                place = begin + 1 + int(np.argmax(off))
+                ends.add(place)
+                stretches += [(begin, place), (place, end)]
+        left = [inside[place] for place in sorted(ends)]
+        before, after = (_shorter(self.rows.q, rows) for rows in (inside, left))
+        for row in left[1:-1]:
+            self.rounding[row] *= min(1.0, before[row] / max(after[row], STANDS))
+        self.chosen -= set(inside) - set(left)
+
+    def assembled(self) -> RobotRows:
+        """The rows that stay, with what was found of their seams."""
+        chosen = sorted(self.chosen | set(self.poses))
+        few = chosen_rows(self.scene, self.rows, np.array(chosen))
+        few = replace(few, rounding=np.array([self.rounding[row] for row in chosen]))
+        if not self.seams:
+            return few
+        place = {row: index for index, row in enumerate(chosen)}
+        inside = [row for _, first, last in self.seams for row in range(place[first], place[last] + 1)]
+        return replace(
+            few,
+            qd=None,
+            stops=tuple(row for row in few.stops if row not in inside),
+            X_PT=np.array([self.poses.get(row, np.full((4, 4), np.nan)) for row in chosen]),
+            feeds=np.array([self.feeds.get(row, np.nan) for row in chosen]),
+            middles=np.array([row in self.middles for row in chosen]),
+            seams=tuple(Seam(task=task, first=place[first], last=place[last]) for task, first, last in self.seams),
+        )
+
+
+def _seams_of(
+    scene: Scene, job: ExportJob, both: tuple[RobotRows, ProgramRows], work: Sequence[WorkRows], *, most: float
+) -> RobotRows:
+    """The rows of one robot, with its seams; ``both`` are those of its joints, and all of the program."""
+    thinned, every = both
+    rows = every.robots[thinned.robot]
+    chosen = np.searchsorted(times_of(rows), times_of(thinned)).tolist()
+    shares = np.full(len(thinned), job.blend) if thinned.rounding is None else thinned.rounding
+    state = _SeamRows(
+        scene=scene, rows=rows, chosen=set(chosen), rounding=dict(zip(chosen, shares.tolist(), strict=True))
+    )
+    for phase in work:
+        path = _path(scene, job, every, thinned.robot, phase, most)
+        first, last = phase.rows.start, min(phase.rows.stop, len(rows)) - 1
+        if path is None:
+            state.straighten(first, last)
+        else:
+            state.follow(path, first, last)
+    return state.assembled()
 
 
 def _path(
@@ -184,18 +249,24 @@ def _path(
     return ToolPath(task=task, X_PT=X_PW @ scene.chains[robot].tool_poses(q[robot]), most=most)
 
 
-def _kept_rows(path: ToolPath, rows: RobotRows, first: int, last: int) -> list[int]:
+def _shorter(q: Array, places: Sequence[int]) -> dict[int, float]:
+    """Length of the shorter segment at each inner one of some rows, in the space of the joints."""
+    lengths = np.linalg.norm(np.diff(q[list(places)], axis=0), axis=1)
+    return dict(zip(places[1:-1], np.minimum(lengths[:-1], lengths[1:]).tolist(), strict=True))
+
+
+def _piece_ends(path: ToolPath, rows: RobotRows, first: int, last: int) -> list[int]:
     """Rows of a phase at which lines and arcs end, counted from its first: waits, switches of the process, corners."""
     inside = range(first + 1, last)
     needed = {first, last, *(row for row in rows.marks if row in inside)}
     needed |= set((first + np.flatnonzero(switches(rows)[first : last + 1])).tolist())
     corners = [row for row in rows.stops if row in inside and row not in needed]
-    kept = sorted(needed)
+    ends = sorted(needed)
     for row in corners:
-        before, after = max(r for r in kept if r < row), min(r for r in kept if r > row)
+        before, after = max(r for r in ends if r < row), min(r for r in ends if r > row)
         if not path.stands(before - first, row - first) and not path.stands(row - first, after - first):
-            kept = sorted([*kept, row])
-    return [row - first for row in kept]
+            ends = sorted([*ends, row])
+    return [row - first for row in ends]
 
 
 def _feed(path: ToolPath, rows: RobotRows, between: tuple[int, int, int]) -> float:
@@ -221,36 +292,3 @@ def _cuts(path: ToolPath, pieces: Sequence[Piece]) -> Iterator[float]:
             continue
         cut, turn = corner_cut(one.shape, other.shape, LARGEST_SHARE * shorter)
         yield LARGEST_SHARE / max(cut / allowed, float(np.linalg.norm(turn)) / MOST_TURN, 1.0)
-
-
-def _shares(job: ExportJob, rows: RobotRows) -> list[float]:
-    """Shares within which rows of joints are rounded."""
-    return (np.full(len(rows), job.blend) if rows.rounding is None else rows.rounding).tolist()
-
-
-def _assembled(
-    scene: Scene,
-    rows: RobotRows,
-    chosen: Sequence[int],
-    poses: Mapping[int, Array],
-    feeds: Mapping[int, float],
-    rounding: Mapping[int, float],
-    middles: set[int],
-    seams: Sequence[tuple[str, int, int]],
-) -> RobotRows:
-    """Chosen rows with what was found of their seams."""
-    few = chosen_rows(scene, rows, np.array(chosen))
-    if not seams:
-        return replace(few, rounding=np.array([rounding[row] for row in chosen]))
-    place = {row: index for index, row in enumerate(chosen)}
-    inside = [row for _, first, last in seams for row in range(place[first], place[last] + 1)]
-    return replace(
-        few,
-        qd=None,
-        stops=tuple(row for row in few.stops if row not in inside),
-        rounding=np.array([rounding[row] for row in chosen]),
-        X_PT=np.array([poses.get(row, np.full((4, 4), np.nan)) for row in chosen]),
-        feeds=np.array([feeds.get(row, np.nan) for row in chosen]),
-        middles=np.array([row in middles for row in chosen]),
-        seams=tuple(Seam(task=task, first=place[first], last=place[last]) for task, first, last in seams),
-    )

@@ -1,10 +1,12 @@
 r"""Seams as controllers execute them: rows of joints along each line and arc, and a tube round these.
 
 A controller moves the tool straight, or on a circle, in a frame of the part and finds the joints as it goes, from those
-at which the seam was entered. The rows are such joints at the places that the tool passes in the run. How far a tool may
-be from the even motion between these is its *tube*: what the joints bend off the line between two rows, what the rules of
-orientation differ, what a rounded corner cuts, and what a controller's own weave and sensors add. The tube of the joints
-follows from that of the tool, :math:`|\delta q_i| \le |J^{-1}_{i,v}| \epsilon_p + |J^{-1}_{i,\omega}| \epsilon_r`.
+at which the seam was entered. The rows are such joints at the places that the tool passes in the run. How far a tool
+may be from the even motion between these is its *tube*: what the joints bend off the line between two rows, what the
+rules of orientation differ, and what a rounded corner cuts. The tube of the joints follows from that of the tool, to
+which a controller's own weave and sensors add where bodies are judged:
+
+.. math:: |\delta q_i| \le |J^{-1}_{i,v}| \epsilon_p + |J^{-1}_{i,\omega}| \epsilon_r .
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,6 +25,7 @@ from cellplan.programs.elements.corners import row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.frames import controller_base, on_flange
 from cellplan.programs.elements.joints import Axes
+from cellplan.programs.elements.process import ProcessForm
 from cellplan.programs.rows.part_targets import POSE_TOL, solved_joints, tip_jacobians
 from cellplan.programs.rows.rows import times_of
 from cellplan.programs.seams.shapes import STANDS, Shape, arc, corner_cut, line
@@ -52,7 +55,7 @@ class SeamExecution:
     def __init__(
         self, frame: ExportFrame, full: ProgramRows, read: ProgramRows, rows: RobotRows, *, dialect: Dialect
     ) -> None:
-        """Take what a reader found, and the run, whose rows say which branch of the joints is meant."""
+        """Take what a reader recovered, and the run, whose rows say which branch of the joints is meant."""
         self._frame, self._rows, self._dialect = frame, rows, dialect
         self._robot: Robot = frame.robot(rows.robot)
         self._chain = ScrewChain(self._robot)
@@ -63,6 +66,13 @@ class SeamExecution:
         """Times and joints of the robot in the run."""
         rows = self._full.robots[self._rows.robot]
         return times_of(rows), rows.q
+
+    @cached_property
+    def _weave(self) -> float:
+        """How far weave and sensors of its controller move the tool from its path in process, in [m]."""
+        control = self._robot.control
+        form = None if control is None else ProcessForm.of(self._frame.cell.controllers[control.id])
+        return 0.0 if form is None else form.tube
 
     def rows(self) -> RobotRows:
         """The rows of joints with their tube; ``NotVerifiedError`` where a seam cannot be executed as it is stated."""
@@ -158,23 +168,11 @@ class SeamExecution:
         q, misses = solved_joints(self._chain, X_WT, near, arm=arm)
         q[0] = q_entry
         places = MM * (travelled + shares * shape.length)
-        self._require_reached(seam, q, misses, places)
-        self._require_limits(seam, q, places, feed=float(self._rows.feeds[last]), lengths=shares * shape.length)  # type: ignore[index]
-        return SeamPath(shape=shape, shares=shares, times=times, q=q, tube=self._tube(shape, shares, q, X_WP))
-
-    def _require_reached(self, seam: Seam, q: Array, misses: Array, places: Array) -> None:
-        """The tool meets every pose of a line, and no joint jumps on the way: the branch is the one continued."""
-        steps = np.abs(np.diff(q, axis=0))
-        jumps, missed = np.any(steps > LARGEST_STEP, axis=1), misses[1:] > 10.0 * POSE_TOL
-        if np.any(jumps | missed):
-            step = int(np.argmax(jumps | missed))
-            joint = self._robot.model.joints[int(np.argmax(steps[step]))].name
-            raise NotVerifiedError(
-                [
-                    f"task '{seam.task}', {places[step + 1]:.1f} mm along its seam: no continuous motion of the joints "
-                    f"follows the line, which passes near a singular configuration: joint {joint} of '{self._robot.name}'"
-                ]
-            )
+        _require_reached(self._robot, seam, q, misses, places)
+        _require_limits(self._robot, seam, q, places, feed=float(self._rows.feeds[last]), lengths=shares * shape.length)  # type: ignore[index]
+        is_on = self._rows.process is not None and bool(self._rows.process[first])
+        tube = self._tube(shape, shares, q, X_WP, is_on=is_on)
+        return SeamPath(shape=shape, shares=shares, times=times, q=q, tube=tube)
 
     def _require_configuration(self, seam: Seam, row: int, q: Array, place: float) -> None:
         """The configuration that was read with a pose is that of the joints; at an edge either side of it is right."""
@@ -190,36 +188,7 @@ class SeamExecution:
                 ]
             )
 
-    def _require_limits(self, seam: Seam, q: Array, places: Array, *, feed: float, lengths: Array) -> None:
-        """No joint leaves its limits, nor moves faster than it may while the tool moves at its speed."""
-        model = self._robot.model
-        beyond = np.maximum(model.lower - q, q - model.upper)
-        where = f"task '{seam.task}'"
-        if np.any(beyond > POSE_TOL):
-            row, index = (int(place) for place in np.unravel_index(np.argmax(beyond), beyond.shape))
-            unit, scale = model.joints[index].display_unit
-            raise NotVerifiedError(
-                [
-                    f"{where}, {places[row]:.1f} mm along its seam: joint {model.joints[index].name} of "
-                    f"'{self._robot.name}' leaves its limits by {scale * float(beyond[row, index]):.3g} {unit}"
-                ]
-            )
-        moved = np.diff(lengths)
-        rates = np.abs(np.diff(q, axis=0))[moved > STANDS] * (feed / moved[moved > STANDS])[:, None]
-        limits = model.velocity
-        if rates.size and np.any(rates > (1.0 + SPEED_TOL) * limits):
-            row, index = (int(place) for place in np.unravel_index(np.argmax(rates / limits), rates.shape))
-            unit, scale = model.joints[index].display_unit
-            raise NotVerifiedError(
-                [
-                    f"{where}, {places[1:][moved > STANDS][row]:.1f} mm along its seam: joint "
-                    f"{model.joints[index].name} of '{self._robot.name}' would move at "
-                    f"{scale * float(rates[row, index]):.4g} {unit}/s at {MM * feed:.4g} mm/s, allowed "
-                    f"{scale * float(limits[index]):.4g}"
-                ]
-            )
-
-    def _tube(self, shape: Shape, shares: Array, q: Array, X_WP: Array) -> Array:
+    def _tube(self, shape: Shape, shares: Array, q: Array, X_WP: Array, *, is_on: bool) -> Array:
         """The tube of every step, without corners, shape (M - 1, 2 + n)."""
         middle = shape.poses(0.5 * (shares[:-1] + shares[1:]))
         X = inverse(X_WP) @ self._chain.tool_poses(0.5 * (q[:-1] + q[1:]))
@@ -227,7 +196,8 @@ class SeamExecution:
         turned = np.linalg.norm(rotation_vector(X[:, :3, :3] @ np.swapaxes(middle[:, :3, :3], 1, 2)), axis=1)
         rules = shape.rule_margins(shares)
         tool = np.stack([BENT * off, BENT * turned + np.maximum(rules[:-1], rules[1:])], axis=1)
-        return np.concatenate([tool, self._joints_off(tool, q)], axis=1)
+        judged = tool + np.array([self._weave if is_on else 0.0, 0.0])
+        return np.concatenate([tool, self._joints_off(judged, q)], axis=1)
 
     def _joints_off(self, tool: Array, q: Array) -> Array:
         """How far joints may be off in each step for what a tool is, shape (M - 1, 2), shape (M - 1, n)."""
@@ -264,6 +234,51 @@ class SeamExecution:
             yield row, replace(path, tube=tube)
 
 
+def _require_reached(robot: Robot, seam: Seam, q: Array, misses: Array, places: Array) -> None:
+    """The tool meets every pose of a line, and no joint jumps on the way: the branch is the one continued."""
+    steps = np.abs(np.diff(q, axis=0))
+    jumps, missed = np.any(steps > LARGEST_STEP, axis=1), misses[1:] > 10.0 * POSE_TOL
+    if np.any(jumps | missed):
+        step = int(np.argmax(jumps | missed))
+        joint = robot.model.joints[int(np.argmax(steps[step]))].name
+        raise NotVerifiedError(
+            [
+                f"task '{seam.task}', {places[step + 1]:.1f} mm along its seam: no continuous motion of the joints "
+                f"follows the line, as joint {joint} of '{robot.name}' passes near a singular configuration"
+            ]
+        )
+
+
+def _require_limits(robot: Robot, seam: Seam, q: Array, places: Array, *, feed: float, lengths: Array) -> None:
+    """No joint leaves its limits, nor moves faster than it may while the tool moves at its speed."""
+    model = robot.model
+    beyond = np.maximum(model.lower - q, q - model.upper)
+    where = f"task '{seam.task}'"
+    if np.any(beyond > POSE_TOL):
+        row, index = (int(place) for place in np.unravel_index(np.argmax(beyond), beyond.shape))
+        unit, scale = model.joints[index].display_unit
+        raise NotVerifiedError(
+            [
+                f"{where}, {places[row]:.1f} mm along its seam: joint {model.joints[index].name} of "
+                f"'{robot.name}' leaves its limits by {scale * float(beyond[row, index]):.3g} {unit}"
+            ]
+        )
+    moved = np.diff(lengths)
+    rates = np.abs(np.diff(q, axis=0))[moved > STANDS] * (feed / moved[moved > STANDS])[:, None]
+    limits = model.velocity
+    if rates.size and np.any(rates > (1.0 + SPEED_TOL) * limits):
+        row, index = (int(place) for place in np.unravel_index(np.argmax(rates / limits), rates.shape))
+        unit, scale = model.joints[index].display_unit
+        raise NotVerifiedError(
+            [
+                f"{where}, {places[1:][moved > STANDS][row]:.1f} mm along its seam: joint "
+                f"{model.joints[index].name} of '{robot.name}' would move at "
+                f"{scale * float(rates[row, index]):.4g} {unit}/s at {MM * feed:.4g} mm/s, allowed "
+                f"{scale * float(limits[index]):.4g}"
+            ]
+        )
+
+
 def executed_programs(
     job: ExportJob, dialect: Dialect, full: Sequence[ProgramRows], read: Sequence[ProgramRows]
 ) -> tuple[ProgramRows, ...]:
@@ -271,11 +286,11 @@ def executed_programs(
 
     Raises:
         InputError: A seam has no frame, or no speed.
-        NotVerifiedError: A line cannot be followed by the joints: with the task, the length along its seam and the joint.
+        NotVerifiedError: Joints cannot follow a line: with the task, the length along its seam and the joint.
     """
     by_name: Mapping[str | None, ProgramRows] = {program.name: program for program in full}
     programs = []
-    for meant, found in zip(job.programs, read, strict=True):
+    for meant, recovered in zip(job.programs, read, strict=True):
         shares = row_shares(job, meant)
         timed = {
             name: replace(
@@ -283,14 +298,14 @@ def executed_programs(
                 times=meant.robots[name].times if rows.times is None else rows.times,
                 rounding=shares[name] if rows.rounding is None else rows.rounding,
             )
-            for name, rows in found.robots.items()
+            for name, rows in recovered.robots.items()
         }
-        timed_program = replace(found, robots=timed)
+        timed_program = replace(recovered, robots=timed)
         programs.append(
             replace(
-                found,
+                recovered,
                 robots={
-                    name: SeamExecution(job.frame, by_name[found.name], timed_program, rows, dialect=dialect).rows()
+                    name: SeamExecution(job.frame, by_name[recovered.name], timed_program, rows, dialect=dialect).rows()
                     for name, rows in timed.items()
                 },
             )

@@ -54,7 +54,7 @@ class Shape:
         return radius if self.normal is None else radius * self.angle
 
     def shares(self, p: Array) -> Array:
-        """Shares of its length at which it is nearest to points of the part in [m], shape (N, 3); 0 to 1, shape (N,)."""
+        """Shares of its length, 0 to 1, at which it is nearest to points of the part in [m], shape (N, 3) to (N,)."""
         offset = p - self.start[:3, 3]
         if self.length < STANDS:
             return np.zeros(len(p))
@@ -120,8 +120,8 @@ def arc(start: Array, middle: Array, end: Array) -> Shape | None:
 def corner_cut(one: Shape, other: Shape, radius: float) -> tuple[float, Array]:
     """By how much a corner that is rounded within a distance in [m] of its row is cut, in [m], and by which turn.
 
-    Whatever the curve, it stays in the triangle of the corner and the two places at which it leaves both paths. The turn
-    is a rotation vector in the frame of the part in [rad], shape (3,).
+    Whatever the curve, it stays in the triangle of the corner and the two places at which it leaves both paths. The
+    turn is a rotation vector in the frame of the part in [rad], shape (3,).
     """
     ends = one.poses(np.array([max(1.0 - radius / one.length, 0.0), 1.0]))
     after = other.poses(np.array([min(radius / other.length, 1.0)]))[0]

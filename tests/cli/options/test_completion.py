@@ -12,7 +12,7 @@ from cellplan.cli.main import run
 from cellplan.cli.options import completion
 from cellplan.files.robots.bundled import bundled_names
 from cellplan.model.cell.cell import Mode
-from cellplan.model.report.exported import Targets
+from cellplan.model.report.exported import Moves
 from cellplan.model.solver import METHODS, Integrator
 from cellplan.programs.export.program import EXPORTERS
 from cellplan.search.programs.objective import CycleTiming, Objective
@@ -50,8 +50,8 @@ def folder(cells: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
         ("robots kuka_kr6", ["kuka_kr6", "kuka_kr6_maker_zero"]),
         ("robots ar", ["arm.urdf"]),
         ("export outputs/run --format ", [*EXPORTERS, "all"]),
-        ("export outputs/run --targets ", [str(kind) for kind in Targets]),
-        ("export outputs/run --promise ", ["timed", "synchronised", "sequence"]),
+        ("export outputs/run --moves ", [str(kind) for kind in Moves]),
+        ("export outputs/run --promise ", ["timed", "synchronised", "paced", "sequence"]),
         ("solve cells/four_robots.yaml --mode ", [str(mode) for mode in Mode]),
         ("solve cells/four_robots.yaml --method ", list(METHODS)),
         ("solve cells/four_robots.yaml --integrator ", ["auto", *map(str, Integrator)]),

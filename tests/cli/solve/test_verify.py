@@ -159,8 +159,8 @@ def test_exported_programs_are_verified_against_the_run_around_them(
     ("words", "message"),
     [
         (["--robot", "other"], "--robot: expected one of left, right, idle, got 'other'"),
-        (["--targets", "tools"], "--targets: expected one of joints, part, got 'tools'"),
-        (["--targets", "part"], "--targets: expected joints with csv, got part"),
+        (["--moves", "tools"], "--moves: expected one of joints, linear, auto, got 'tools'"),
+        (["--moves", "linear"], "--moves: expected joints with csv, got linear"),
         (["--split", "7"], "--split: expected no --split with csv"),
         (["--thin-mm", "0.1"], "--thin-mm: expected no thinning with csv"),
     ],

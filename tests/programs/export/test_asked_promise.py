@@ -71,7 +71,10 @@ def test_a_promise_that_is_not_kept_is_not_replaced_by_a_lesser_one(folder: Path
     status, _, error = export(folder, "--format val3", "--promise timed")
     assert (status, error) == (2, "error: --promise: expected sequence only with val3, got timed\n")
     status, _, error = export(folder, "--format val3", "--promise best")
-    assert (status, error) == (2, "error: --promise: expected one of timed, synchronised, sequence, got 'best'\n")
+    assert (status, error) == (
+        2,
+        "error: --promise: expected one of timed, synchronised, paced, sequence, got 'best'\n",
+    )
 
 
 def test_a_latency_that_is_not_stated_is_asked_for_where_times_are(run: VerifiedRun) -> None:

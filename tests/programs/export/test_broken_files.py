@@ -179,7 +179,7 @@ def test_untouched_programs_are_verified(exports: dict[str, Path], run: Verified
         ("robots", ["right", "left"], "robots: expected robots of the cell in its order"),
         ("robots", [], "robots: expected robots of the cell in its order"),
         ("split", "all", "split: expected a whole number"),
-        ("targets", "tools", "targets: expected one of joints, part, got 'tools'"),
+        ("moves", "tools", "moves: expected one of joints, linear, auto, got 'tools'"),
         ("format", "apt", "expected one of csv, "),
         ("decimals", 6, "decimals: expected 9, got 6"),
         ("cell", "other", "cell: expected 'small-pair', got 'other'"),

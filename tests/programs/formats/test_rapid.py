@@ -25,7 +25,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cellplan.errors import InputError
-from cellplan.model.report.exported import ExportJob, ProgramRows, Promise, Targets
+from cellplan.model.report.exported import ExportJob, Moves, ProgramRows, Promise
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.formats.rapid.writer import RAPID
@@ -389,6 +389,6 @@ def test_a_robot_of_many_axes_is_refused() -> None:
 
 def test_the_format_is_one_of_the_dialects() -> None:
     assert isinstance(DIALECTS["rapid"], Dialect)
-    assert DIALECTS["rapid"].promises == (Promise.SYNCHRONISED, Promise.SEQUENCE_ONLY)
-    assert Targets.PART in DIALECTS["rapid"].targets
+    assert DIALECTS["rapid"].promises == (Promise.SYNCHRONISED, Promise.PACED, Promise.SEQUENCE_ONLY)
+    assert Moves.LINEAR in DIALECTS["rapid"].moves
     assert CONTROLLER in multimove_job().frame.cell.controllers

@@ -172,7 +172,7 @@ def test_choices_that_a_format_cannot_keep_are_refused(choice: dict[str, float],
     [
         ("--format krl --thin-mm 0", "--thin-mm: expected a positive number, got 0"),
         ("--format csv --split 20", "--split: expected no --split with csv, whose files have no limit"),
-        ("--format krl --targets part", "--targets: expected joints with krl, got part"),
+        ("--format krl --moves linear", "--moves: expected joints with krl, got linear"),
         ("--format wide --robot left", "--format: expected no choice of robots, rows or targets with wide, a table of"),
     ],
 )

@@ -89,7 +89,7 @@ def _examine(frame: ExportFrame, unit: RapidUnit, datum: Datum, part: PartFrame 
         datum.statement.refuse(f"a value of {datum.kind}")
     if datum.kind == "tooldata":
         _examine_tool(unit, datum, value)
-    elif datum.kind == "wobjdata":
+    elif datum.kind == "wobjdata" and frame.promise is not Promise.PACED:  # or else compared where it is used
         _examine_work_object(datum, value, part)
     elif datum.kind == "speeddata" and not all(number > 0.0 for number in value):
         datum.statement.refuse("speeds above 0")

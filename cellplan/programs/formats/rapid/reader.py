@@ -13,6 +13,7 @@ from cellplan.model.report.exported import ExportFrame, ProgramRows, Promise, Ro
 from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step
 from cellplan.programs.formats.rapid.data import RapidData, read_data
 from cellplan.programs.formats.rapid.moves import Place, RapidMove, read_move
+from cellplan.programs.formats.rapid.paced import PacedReader
 from cellplan.programs.formats.rapid.rows import rows_of
 from cellplan.programs.formats.rapid.text import RapidModule, RapidStatement, read_module
 from cellplan.programs.formats.rapid.units import WORDS, PartFrame, RapidUnit, part_frame, rapid_units, works_on_part
@@ -56,6 +57,10 @@ def read_rapid(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRow
     left, programs = dict(files), []
     for name in frame.programs:
         folder = "" if name is None else f"{name}/"
+        if frame.promise is Promise.PACED:
+            rows = (_read_paced(frame, unit, left, folder) for unit in units)
+            programs.append(ProgramRows(name=name, robots={one.robot: one for one in rows}))
+            continue
         tasks = [_read_task(frame, unit, left, folder=folder, part=part) for unit in units]
         if frame.promise is Promise.SYNCHRONISED:
             for task in tasks:
@@ -72,7 +77,7 @@ def _read_task(
     """The program of one robot; its files are taken out of those that are left."""
     modules = _modules_of(unit, left, folder)
     data = read_data(frame, unit, modules, part if works_on_part(frame, unit.robot.name) else None)
-    statements = _flat(modules)
+    statements = [statement for _, statement in _flat(modules)]
     is_synchronised = frame.promise is Promise.SYNCHRONISED
     moves: list[RapidMove] = []
     syncs: list[_Sync] = []
@@ -102,6 +107,12 @@ def _read_task(
     return _Task(unit, data, moves, syncs, tuple(marks))
 
 
+def _read_paced(frame: ExportFrame, unit: RapidUnit, left: dict[str, str], folder: str) -> RobotRows:
+    """The rows of one robot with its seams; its files are taken out of those that are left."""
+    modules = _modules_of(unit, left, folder)
+    return PacedReader(frame, unit, read_data(frame, unit, modules, None)).rows(_flat(modules))
+
+
 def _modules_of(unit: RapidUnit, left: dict[str, str], folder: str) -> list[tuple[str, RapidModule]]:
     """The modules that the program file of a robot names, the first of which has its name."""
     path = f"{folder}{unit.module}.pgf"
@@ -126,8 +137,8 @@ def _modules_of(unit: RapidUnit, left: dict[str, str], folder: str) -> list[tupl
     return modules
 
 
-def _flat(modules: list[tuple[str, RapidModule]]) -> list[RapidStatement]:
-    """Statements of the main routine, each page in the place where it is called."""
+def _flat(modules: list[tuple[str, RapidModule]]) -> list[tuple[str, RapidStatement]]:
+    """Statements of the main routine with the names of their routines, each page in the place where it is called."""
     routines: dict[str, list[RapidStatement]] = {}
     for _, module in modules:
         for name, statements in module.routines.items():
@@ -140,14 +151,14 @@ def _flat(modules: list[tuple[str, RapidModule]]) -> list[RapidStatement]:
     for statement in routines["main"]:
         name = statement.text.lower()
         if not _CALL.fullmatch(name) or name in WORDS:
-            flat.append(statement)
+            flat.append(("main", statement))
         elif name not in routines:
             statement.refuse("the name of a routine that is declared")
         elif name in called:
             statement.refuse("each page called once")
         else:
             called.add(name)
-            flat += routines[name]
+            flat += [(name, inner) for inner in routines[name]]
     for _, module in modules:
         for name, head in module.heads.items():
             if name not in called:

@@ -11,7 +11,7 @@ from cellplan.geometry.transforms import Array, pose_from, quaternion_to_rotatio
 from cellplan.model.report.exported import RobotRows
 from cellplan.model.units import MM
 from cellplan.programs.elements.joints import from_numbers
-from cellplan.programs.formats.rapid.moves import RapidMove
+from cellplan.programs.formats.rapid.moves import RapidMove, Zone
 from cellplan.programs.formats.rapid.units import EXTERNAL_AXES, TIME_DECIMALS, RapidUnit
 from cellplan.programs.formats.zones import axis_shares, part_shares, tool_shares
 
@@ -60,18 +60,18 @@ def rows_of(unit: RapidUnit, moves: Sequence[RapidMove], marks: tuple[int, ...])
         marks=marks,
         X_PT=X_PT if any_part else None,
         configuration=turns if any_part else None,
-        rounding=_rounding(unit, moves, q, X_PT[:, :3, 3]),
+        rounding=rounding(unit, [move.zone for move in moves], q, X_PT[:, :3, 3]),
     )
 
 
-def _rounding(unit: RapidUnit, moves: Sequence[RapidMove], q: Array, p: Array) -> Array:
+def rounding(unit: RapidUnit, zones: Sequence[Zone], q: Array, p: Array) -> Array:
     """Share of the shorter neighbouring segment within which each row is rounded, shape (N,).
 
     Args:
         q: Positions in [rad] or [m], shape (N, n); those of the arm are NaN at targets on the part.
         p: Position of the tool on the part in [m], shape (N, 3); NaN at all other targets.
     """
-    tool, turns, slides = (np.array([move.zone[place] for move in moves]) for place in range(3))
+    tool, turns, slides = (np.array([zone[place] for zone in zones]) for place in range(3))
     if not unit.has_tool:
         return axis_shares(unit.robot, q, turns, slides)
     on_part = part_shares(p, tool / MM)

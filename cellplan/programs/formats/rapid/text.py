@@ -149,16 +149,16 @@ def _statements(text: str, file: str) -> Iterator[RapidStatement]:
             begun = begun if pending else number
             block = None if pending else _BLOCK.match(rest)
             if block:
-                yield RapidStatement(_plain(block[1]), file, number)
+                yield RapidStatement(plain_statement(block[1]), file, number)
                 rest = block[2]
                 continue
             head, ended, rest = rest.partition(";")
             pending = f"{pending} {head}" if pending else head
             if ended:
-                yield RapidStatement(_plain(pending), file, begun)
+                yield RapidStatement(plain_statement(pending), file, begun)
                 pending = ""
     if pending:
-        RapidStatement(_plain(pending), file, begun).refuse("a semicolon at the end of the statement")
+        RapidStatement(plain_statement(pending), file, begun).refuse("a semicolon at the end of the statement")
     if is_header:
         raise InputError(f"{file}: expected a second line %%% after the version")
 
@@ -195,7 +195,7 @@ def _header(line: str, statement: RapidStatement, *, is_header: bool) -> bool:
     return True
 
 
-def _plain(text: str) -> str:
+def plain_statement(text: str) -> str:
     """A statement with one space between words and none round signs."""
     text = text.strip()
     space = text.find(" ")

@@ -11,7 +11,7 @@ parabola from the edge of the zone, and a zone larger than half the distance to 
 half; during joint movement it "may differ somewhat" (ABB, RAPID reference manual, zonedata).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -35,11 +35,12 @@ from cellplan.model.units import MM
 from cellplan.programs.elements.corners import chosen_shares, moves, row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.frames import on_flange
-from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step, signals_by_key
+from cellplan.programs.elements.handshake import handshake_steps, lowering_step, signals_by_key
 from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.joints import from_numbers, to_numbers
 from cellplan.programs.elements.text import comment, fixed, joined, safe_names
 from cellplan.programs.formats.rapid.moves import LARGEST_ID
+from cellplan.programs.formats.rapid.paced import PacedWriter, signal_text
 from cellplan.programs.formats.rapid.reader import read_rapid
 from cellplan.programs.formats.rapid.targets import configuration, frame_text, joint_targets, part_targets
 from cellplan.programs.formats.rapid.units import (
@@ -81,12 +82,15 @@ def render_rapid(job: ExportJob) -> dict[str, str]:
     files: dict[str, str] = {}
     for program in job.programs:
         durations = _durations(job.frame, program)
-        zones = row_zones(job, program, units)
+        zones = {} if job.frame.promise is Promise.PACED else row_zones(job, program, units)
         folder = "" if program.name is None else f"{program.name}/"
         for unit in units:
             name = unit.robot.name
-            moves = _moves(job.frame, unit, program.robots[name], durations=durations[name], zones=zones[name])
-            modules = _modules(job, units, unit, part=part, moves=moves, zones=zones[name])
+            if job.frame.promise is Promise.PACED:
+                modules = _paced_modules(job, units, unit, program, durations[name])
+            else:
+                moves = _moves(job.frame, unit, program.robots[name], durations=durations[name], zones=zones[name])
+                modules = _modules(job, units, unit, part=part, moves=moves, zones=zones[name])
             files |= {f"{folder}{module}.mod": text for module, text in modules.items()}
             files[f"{folder}{unit.module}.pgf"] = _program_file(modules)
     return files
@@ -143,13 +147,36 @@ def _durations(frame: ExportFrame, program: ProgramRows) -> dict[str, list[str]]
     return durations
 
 
+def _paced_modules(
+    job: ExportJob, units: Sequence[RapidUnit], unit: RapidUnit, program: ProgramRows, durations: Sequence[str]
+) -> dict[str, str]:
+    """Text of the one module of a robot with seams, by its name."""
+    paced = PacedWriter.of(job, program, unit)
+    rows = {name: replace(rows, X_PT=None, marks=()) for name, rows in program.robots.items()}
+    zones = row_zones(job, replace(program, robots=rows), units)[unit.robot.name]
+    targets = [paced.point(row) for row in range(len(zones))]
+    joint_moves = _moves(job.frame, unit, rows[unit.robot.name], durations=durations, zones=zones, targets=targets)
+    routines = paced.routines([move for (move,) in joint_moves])
+    notes = list(chain.from_iterable(comment(note, "!") for note in _notes(job, unit)))
+    is_joint = ~paced.rows.on_seam
+    sizes = [*paced.zones(), *(size for size, is_used in zip(zones, is_joint, strict=True) if is_used)]
+    data = [*notes, *_data(job, units, unit, None), *zone_data(unit, sizes), *paced.data()]
+    return {unit.module: _module(unit.module, data, routines)}
+
+
 def _moves(
-    frame: ExportFrame, unit: RapidUnit, rows: RobotRows, *, durations: Sequence[str], zones: Sequence[int]
+    frame: ExportFrame,
+    unit: RapidUnit,
+    rows: RobotRows,
+    *,
+    durations: Sequence[str],
+    zones: Sequence[int],
+    targets: Sequence[str] | None = None,
 ) -> list[list[str]]:
-    """Statements at each row: the move there, and the handshake where the robot waits."""
+    """Statements at each row: the move there, to a target or its name, and the handshake where it waits."""
     is_synchronised = frame.promise is Promise.SYNCHRONISED
     at_part = rows_at_part(rows)
-    targets = joint_targets(unit, rows.q)
+    targets = joint_targets(unit, rows.q) if targets is None else list(targets)
     if np.any(at_part) and rows.X_PT is not None:
         stated = part_targets(unit, rows.q[at_part], rows.X_PT[at_part])
         for place, target in zip(np.flatnonzero(at_part).tolist(), stated, strict=True):
@@ -166,9 +193,9 @@ def _moves(
         if rows.marks:
             _require_names(frame, unit.robot.name)
             if handshake_steps(frame, unit.robot.name):
-                moves[0].insert(0, _signal(lowering_step(frame, unit.robot.name)))
+                moves[0].insert(0, signal_text(lowering_step(frame, unit.robot.name)))
         for mark in rows.marks:
-            moves[mark] += [_signal(step) for step in handshake_steps(frame, unit.robot.name)]
+            moves[mark] += [signal_text(step) for step in handshake_steps(frame, unit.robot.name)]
     return moves
 
 
@@ -179,11 +206,6 @@ def _require_names(frame: ExportFrame, robot: str) -> None:
             raise InputError(
                 f"{key}: expected the name of a signal of at most {LONGEST_NAME} letters, digits and _, got {signal!r}"
             )
-
-
-def _signal(step: HandshakeStep) -> str:
-    """One instruction of a handshake."""
-    return f"{'WaitDI' if step.waits else 'SetDO'} {step.signal},{int(step.is_on)};"
 
 
 def _modules(
@@ -207,15 +229,17 @@ def _modules(
     if is_synchronised:
         body = [f"SyncMoveOn {SYNC_ON},{TASKS};", *body, f"SyncMoveOff {SYNC_OFF};"]
     data = [*_data(job, units, unit, part), *zone_data(unit, zones)]
-    files = {unit.module: _module(unit.module, [*notes, *data], "main", [*first, *body])}
+    files = {unit.module: _module(unit.module, [*notes, *data], {"main": [*first, *body]})}
     for number, (name, page) in enumerate(zip(names, pages, strict=True), start=1):
-        files[called[name]] = _module(called[name], notes, f"page_{number:03d}", [*chain.from_iterable(page)])
+        files[called[name]] = _module(called[name], notes, {f"page_{number:03d}": [*chain.from_iterable(page)]})
     return files
 
 
-def _module(name: str, data: Sequence[str], routine: str, statements: Sequence[str]) -> str:
-    """Text of one module with one routine."""
-    inner = [f"  PROC {routine}()", *(f"    {statement}" for statement in statements), "  ENDPROC"]
+def _module(name: str, data: Sequence[str], routines: Mapping[str, Sequence[str]]) -> str:
+    """Text of one module with its routines."""
+    inner: list[str] = []
+    for routine, statements in routines.items():
+        inner += [f"  PROC {routine}()", *(f"    {statement}" for statement in statements), "  ENDPROC"]
     return joined([f"MODULE {name}", *(f"  {line}" for line in data), *inner, "ENDMODULE"], line_end=LINE_END)
 
 
@@ -257,7 +281,7 @@ RAPID: Final = Dialect(
     render=render_rapid,
     read=read_rapid,
     decimals=DECIMALS,
-    promises=(Promise.SYNCHRONISED, Promise.SEQUENCE_ONLY),
+    promises=(Promise.SYNCHRONISED, Promise.PACED, Promise.SEQUENCE_ONLY),
     interpolation=Interpolation.LINEAR,
     kinds=frozenset({"abb"}),
     is_thinned=True,
@@ -265,6 +289,7 @@ RAPID: Final = Dialect(
     split=LINES,
     demands=_demands,
     moves=tuple(Moves),
+    configuration=configuration,
 )
 
 
