@@ -243,6 +243,11 @@ class _RowsOfMoves:
             off, on = off or move.process == "off", on or move.process == "on"
             if move.process == "inner" and not is_on:
                 move.refuse("a process that goes on before", "one that is off")
+        form = self._events.form
+        if is_on and form is not None and form.is_move and move.process is None:
+            move.refuse("a motion with its process, which is on", None)
+        if is_on and not off and form is not None and move.zone <= 0.0 and move.share <= 0.0:
+            move.refuse("a rounded row, as a stop ends its process", None)
         if (off and not is_on) or (on and is_on):
             move.refuse(f"a process that is {'on' if off else 'off'} before", "the other")
         if (off or on) and (move.zone > 0.0 or move.share > 0.0):

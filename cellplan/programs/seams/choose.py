@@ -36,8 +36,9 @@ class Piece(NamedTuple):
     """A line or an arc that follows a tool between two rows."""
 
     last: int  # the row at which it ends; it begins where the one before it ends
-    middle: int | None  # the row through which an arc leads
     shape: Shape
+    middle: int | None = None  # the row through which an arc leads
+    through: Array | None = None  # the pose there, turned as the arc turns the tool, shape (4, 4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,7 +67,7 @@ class ToolPath:
 
     def _longest(self, first: int, end: int, *, is_arc: bool) -> Piece:
         """The longest line or arc from a row on, by bisection; one step of the run is a line."""
-        low, high = Piece(first + 1, None, line(*self.X_PT[[first, first + 1]])), end + 1
+        low, high = Piece(first + 1, line(*self.X_PT[[first, first + 1]])), end + 1
         trial = end
         while trial > low.last:
             piece = self._piece(first, trial, is_arc=is_arc)
@@ -76,15 +77,19 @@ class ToolPath:
 
     def _piece(self, first: int, last: int, *, is_arc: bool) -> Piece | None:
         """The line or the arc between two rows; None where it does not follow the tool."""
-        X, middle = self.X_PT[first : last + 1], None
-        shape: Shape | None = line(X[0], X[-1])
-        if is_arc:
-            travel = np.cumsum(np.linalg.norm(np.diff(X[:, :3, 3], axis=0), axis=1))
-            middle = 1 + int(np.searchsorted(travel, 0.5 * travel[-1]))
-            shape = arc(X[0], X[middle], X[-1]) if 0 < middle < last - first else None
-        if shape is None or not self._follows(shape, X):
+        X = self.X_PT[first : last + 1]
+        if not is_arc:
+            shape = line(X[0], X[-1])
+            return Piece(last, shape) if self._follows(shape, X) else None
+        travel = np.cumsum(np.linalg.norm(np.diff(X[:, :3, 3], axis=0), axis=1))
+        middle = 1 + int(np.searchsorted(travel, 0.5 * travel[-1]))
+        circle = arc(X[0], X[middle], X[-1]) if middle < last - first else None
+        if circle is None:
             return None
-        return Piece(last, None if middle is None else first + middle, shape)
+        through = circle.poses(circle.shares(X[middle, None, :3, 3]))[0]
+        circle = arc(X[0], through, X[-1])
+        is_good = circle is not None and self._follows(circle, X)
+        return Piece(last, circle, first + middle, through) if circle is not None and is_good else None
 
     def _follows(self, shape: Shape, X: Array) -> bool:
         """Whether a shape keeps a tool as near to its poses in the run, shape (N, 4, 4), as is allowed."""
@@ -151,11 +156,13 @@ class _SeamRows:
         pieces = list(path.pieces(_piece_ends(path, self.rows, first, last)))
         ends = [0, *(piece.last for piece in pieces)]
         for begin, piece in zip(ends, pieces, strict=False):
-            through = [] if piece.middle is None else [first + piece.middle]
             feed = _feed(path, self.rows, (first, begin, piece.last))
-            for row in (*through, first + piece.last):
-                self.poses[row], self.feeds[row], self.rounding[row] = path.X_PT[row - first], feed, 0.0
-            self.middles.update(through)
+            points = {first + piece.last: path.X_PT[piece.last]}
+            if piece.middle is not None and piece.through is not None:
+                points[first + piece.middle] = piece.through
+                self.middles.add(first + piece.middle)
+            for row, pose in points.items():
+                self.poses[row], self.feeds[row], self.rounding[row] = pose, feed, 0.0
         for row, share in zip(ends[1:-1], _cuts(path, pieces), strict=True):
             is_stop = switches(self.rows)[first + row] or first + row in self.rows.marks
             self.rounding[first + row] = 0.0 if is_stop else share

@@ -1,0 +1,300 @@
+"""Paced programs of a solved cell: what is written is read by other means, and what is changed is noticed."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders.commands import run_command
+
+from cellplan import open_gate
+from cellplan.errors import InputError, NotVerifiedError
+from cellplan.geometry.transforms import Array, inverse, pose_from, quaternion_to_rotation
+from cellplan.model.report.exported import ExportJob, Moves, ProgramRows, Promise, RobotRows, Seam
+from cellplan.model.report.verified_run import VerifiedRun
+from cellplan.programs.dialects import DIALECTS
+from cellplan.programs.export.choice import Choice
+from cellplan.programs.export.prepare import PreparedExport, prepare
+from cellplan.programs.export.written import judged
+from cellplan.programs.judgement.compare_rows import other_rows
+from cellplan.programs.rows.rows import full_rows
+from cellplan.programs.seams.executed import executed_programs
+from cellplan.scene.kinematics.screw_chain import ScrewChain
+
+CELL = """\
+cellplan: 1
+name: ring-and-corner
+robots:
+  arm:
+    model: abb_irb1600_8_145
+    tool: {mass_kg: 3, rod: {length_mm: 300, tilt_deg: 35, radius_mm: 10, stick_out_mm: 15}}
+    home_deg: [0, -20, 20, 0, 60, 0]
+    controller: {id: irc5, tool_frame: {rpy_deg: [0, 0, 180]}, base: {xyz_mm: [0, 0, 100], rpy_deg: [0, 0, 90]}}
+controllers:
+  irc5:
+    kind: abb
+    process:
+      on: "DispLStart {point},{speed},{data},{zone},{tool}\\\\WObj:={frame};"
+      inner: "DispL {point},{speed},{data},{zone},{tool}\\\\WObj:={frame};"
+      off: "DispLEnd {point},{speed},{data},{zone},{tool}\\\\WObj:={frame};"
+      data: {ring: bead1, corner: bead2}
+part:
+  geometry: {box: {size_mm: [500, 400, 60]}}
+  at: {xyz_mm: [1000, 0, 300]}
+tasks:
+  ring:
+    robot: arm
+    path: {circle: {plane: xy, radius_mm: 80}, offset_mm: 30}
+    tool_axis: [0, 0, -1]
+    free: [spin]
+    approach_mm: 60
+    approach_s: 1
+    retract_mm: 60
+    retract_s: 1
+    process: {feed_mm_s: 40, on_delay_s: 0.3, off_delay_s: 0.2}
+  corner:
+    robot: arm
+    path: {polyline: {points_mm: [[-200, -150, 30], [200, -150, 30], [200, 150, 30]]}}
+    tool_axis: [0, 0, -1]
+    free: [spin]
+    approach_mm: 60
+    approach_s: 1
+    retract_mm: 60
+    retract_s: 1
+    tolerance: {position_mm: 0.5}
+    process: {feed_mm_s: 40, on_delay_s: 0.3, off_delay_s: 0.2}
+program: {}
+motion: {mode: part_at_rest, step_s: 0.004}
+checks: {clearance_mm: 5}
+"""
+NUMBERS = r"\[([^\[\]]*)\]"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> VerifiedRun:
+    folder = tmp_path_factory.mktemp("paced")
+    (folder / "cell.yaml").write_text(CELL, encoding="utf-8")
+    status, _, error = run_command("cellplan solve cell.yaml -o run --quiet", folder)
+    assert (status, error) == (0, "")
+    return open_gate(Path(folder / "run"), cell=Path(folder / "cell.yaml"))
+
+
+@pytest.fixture(scope="module")
+def prepared(run: VerifiedRun) -> PreparedExport:
+    return prepare(run, DIALECTS["rapid"], Choice(moves=Moves.LINEAR))
+
+
+@pytest.fixture(scope="module")
+def text(prepared: PreparedExport) -> str:
+    return DIALECTS["rapid"].render(prepared.job)["arm.mod"]
+
+
+def frame_of(words: str) -> Array:
+    """A frame ``[x,y,z],[w,x,y,z]`` in [mm], as the manual of the language has it."""
+    place, turn = (np.array([float(number) for number in part.split(",")]) for part in re.findall(NUMBERS, words)[:2])
+    return pose_from(quaternion_to_rotation(turn), place / 1000.0)
+
+
+def routine(text: str, name: str) -> list[str]:
+    body = re.search(rf"PROC {name}\(\)(.*?)ENDPROC", text, re.S)
+    assert body is not None
+    return [line.strip() for line in body[1].strip().splitlines()]
+
+
+def points(text: str, name: str) -> list[Array]:
+    """Poses of the tool in the world that a routine passes in process, from declarations and frames in the text."""
+    datum = re.search(r"wobjdata w_part_1 := \[FALSE,TRUE,\"\",(\[.*?\],\[.*?\])\],", text)
+    assert datum is not None
+    X_WC = pose_from(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.array([0.0, 0.0, 0.1]))
+    X_WP = X_WC @ frame_of(datum[1])
+    names = [re.findall(rf"{name}_\d+", line) for line in routine(text, name) if line.startswith("Disp")]
+    targets = {word: re.search(rf"robtarget {word} := (.*);", text) for line in names for word in line}
+    return [X_WP @ frame_of(match[1]) for match in targets.values() if match is not None]
+
+
+def test_points_lie_on_the_path_and_the_process_goes_on_and_off_at_its_ends(text: str) -> None:
+    ring, corner = routine(text, "ring"), routine(text, "corner")
+
+    assert [line.partition(" ")[0] for line in corner] == [
+        "MoveAbsJ",
+        "DispLStart",
+        "DispL",
+        "DispLEnd",
+        "MoveL",
+    ]
+    assert ring[1].startswith("DispLStart ring_1,")
+    assert ",fine," in ring[1]
+    assert ",bead1," in ring[1]
+    assert all(line.startswith(("DispC ", "DispL ")) and ",fine," not in line for line in ring[2:-2])
+    assert ring[-2].startswith("DispLEnd ")
+    assert ",fine," in ring[-2]
+    assert sum(line.startswith("DispC ") for line in ring) == 3
+    assert len(ring) <= 12
+    assert "speeddata s_40 := [40,500,100,20];" in text
+    assert all(",s_40," in line for line in (*ring[2:-1], *corner[2:-1]))
+    centre = np.array([1.0, 0.0, 0.33])
+    for X in points(text, "ring"):
+        assert np.linalg.norm(X[:3, 3] - centre) == pytest.approx(0.08, abs=1e-6)
+        np.testing.assert_allclose(X[:3, 2], [0.0, 0.0, -1.0], atol=1e-5)
+    first, inner, last = (X[:3, 3] for X in points(text, "corner"))
+    np.testing.assert_allclose(
+        [first, inner, last], [[0.8, -0.15, 0.33], [1.2, -0.15, 0.33], [1.2, 0.15, 0.33]], atol=1e-6
+    )
+
+
+def test_joints_of_the_entry_bring_the_stated_tool_to_the_approach(text: str, run: VerifiedRun) -> None:
+    """The tool in the turned flange of the controller is where the model has it."""
+    robot = run.cell.robot("arm")
+    tool = re.search(r"tooldata t_arm := \[TRUE,(\[.*?\],\[.*?\])\],", text)
+    assert tool is not None
+    X_FG = np.diag([-1.0, -1.0, 1.0, 1.0])
+    np.testing.assert_allclose(X_FG @ frame_of(tool[1]), robot.tool.X_FT, atol=2e-7)
+
+
+def noticed(prepared: PreparedExport, run: VerifiedRun, text: str) -> str:
+    """What is said of a changed program; empty where nothing is."""
+    dialect, job = prepared.dialect, prepared.job
+    try:
+        read = dialect.read(job.frame, {**dialect.render(job), "arm.mod": text})
+        finding = next(other_rows(dialect, job, read), "")
+        if not finding:
+            executed_programs(job, dialect, full_rows(run), read)
+    except (InputError, NotVerifiedError) as error:
+        return str(error)
+    return finding
+
+
+CHANGES = {
+    "feed": (r"speeddata s_40 := \[40,", "speeddata s_40 := [41,"),
+    "feed of a move": (r"(DispL corner_2),s_40", r"\1,s_60"),
+    "data": (r"(DispL corner_2,s_40),bead2", r"\1,bead1"),
+    "work object": (r"(wobjdata w_part_1 := .FALSE,TRUE,\"\",\[\[)(-?\d+)", r"\g<1>45"),
+    "frame of a move": (r"(MoveL corner_4.*)w_part_1", r"\1wobj0"),
+    "tool frame": (r"(tooldata t_arm := \[TRUE,\[\[.*?\],\[)(-?\d\.\d+)", r"\g<1>1.0000000"),
+    "tool": (r"(MoveL corner_4.*),t_arm", r"\1,tool0"),
+    "configuration": (r"(robtarget corner_2 := .*\[)(-?\d)(,-?\d,-?\d,\d\])", r"\g<1>3\3"),
+    "point": (r"(robtarget corner_2 := \[\[)200\.0000", r"\g<1>200.2000"),
+    "on and off": (r"DispLStart corner_1(.*)DispLEnd", r"DispLEnd corner_1\1DispLStart"),
+    "fine at the end": (r"(DispLEnd corner_3,s_40,bead2),fine", r"\1,z_158"),
+    "a zone for another": (r"(DispL corner_2,s_40,bead2),z_\d+", r"\1,z_9999"),
+    "a stop within": (r"(DispL corner_2,s_40,bead2),z_\d+", r"\1,fine"),
+    "no process": (r"DispL corner_2,s_40,bead2", "MoveL corner_2,s_40"),
+    "bent orientation": (r"(DispL corner_2)", r"SingArea\\Wrist; \1"),
+    "a point used twice": (r"DispL corner_2", "DispL corner_3"),
+    "a line for an arc": (r"DispC ring_2, ?ring_3", "DispL ring_3"),
+    "another order": (r"(    ring;)\s*(    corner;)", r"\2\n\1"),
+    "joints of the entry": (r"(jointtarget j_2 := \[\[)-?\d+", r"\g<1>12"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_change_is_noticed(change: str, prepared: PreparedExport, run: VerifiedRun, text: str) -> None:
+    pattern, repl = CHANGES[change]
+    changed, count = re.subn(pattern, repl, text, count=1, flags=re.S if change == "on and off" else 0)
+    assert count == 1
+    assert changed != text
+    assert noticed(prepared, run, changed)
+
+
+def test_what_is_written_is_what_is_read(prepared: PreparedExport, run: VerifiedRun, text: str) -> None:
+    dialect = prepared.dialect
+    assert prepared.promised.promise is Promise.PACED
+    assert noticed(prepared, run, text) == ""
+    judgement = judged(run, prepared, dialect.read(prepared.job.frame, dialect.render(prepared.job)))
+    assert judgement.passed
+    tube = judgement.executed[0].robots["arm"].tube
+    assert tube is not None
+    assert 0.0 < tube[:, 0].max() <= 0.25 * 0.5e-3 + 1e-5  # the corner in process takes a quarter of its tolerance
+
+
+def job_of_line(prepared: PreparedExport, q: Array, *, configuration: Array | None = None) -> ExportJob:
+    """A seam of one line between the first and the last of some joints, shape (N, 6), which the run has between."""
+    robot = prepared.job.frame.robot("arm")
+    X_WP = robot.X_WB @ inverse(robot.X_WB)
+    X_WP[:3, 3] = [1.0, 0.0, 0.3]
+    X_PT = np.full((2, 4, 4), np.nan)
+    X_PT[1] = inverse(X_WP) @ ScrewChain(robot).tool_poses(q[-1:])[0]
+    rows = RobotRows(
+        robot="arm",
+        q=q[[0, -1]],
+        times=np.array([0.0, 1.0]),
+        process=np.array([True, False]),
+        rounding=np.zeros(2),
+        X_PT=X_PT,
+        configuration=configuration,
+        seams=(Seam(task="corner", first=0, last=1),),
+        feeds=np.array([np.nan, 0.04]),
+        middles=np.zeros(2, dtype=bool),
+    )
+    return replace(prepared.job, programs=(ProgramRows(name=None, robots={"arm": rows}),))
+
+
+def refusal(prepared: PreparedExport, job: ExportJob, q: Array) -> str:
+    every = RobotRows(robot="arm", q=q, times=np.linspace(0.0, 1.0, len(q)))
+    with pytest.raises(NotVerifiedError) as error:
+        executed_programs(job, prepared.dialect, [ProgramRows(name=None, robots={"arm": every})], job.programs)
+    return str(error.value)
+
+
+def test_a_line_that_flips_the_wrist_is_refused_with_task_length_and_joint(prepared: PreparedExport) -> None:
+    """Only axis 5 turns, from one side to the other: a straight tool passes its zero beside the singular direction."""
+    q = np.deg2rad([[0.0, 20.0, 10.0, 30.0, 25.0, 10.0]]) + np.linspace(0.0, 1.0, 201)[:, None] * np.deg2rad(
+        [[8.0, 0.0, 0.0, 0.0, -50.0, 0.0]]
+    )
+
+    message = refusal(prepared, job_of_line(prepared, q), q)
+
+    assert re.search(r"task 'corner', \d+\.\d mm along its seam: .* joint J\d of 'arm' passes near", message)
+
+
+def test_a_line_that_leaves_a_limit_between_its_ends_is_refused(prepared: PreparedExport) -> None:
+    q = np.deg2rad([[-25.0, 25.0, 10.0, 5.0, 50.0, 10.0]]) + np.linspace(0.0, 1.0, 201)[:, None] * np.deg2rad(
+        [[50.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+    )
+    job = job_of_line(prepared, q)
+    every = [ProgramRows(name=None, robots={"arm": RobotRows(robot="arm", q=q, times=np.linspace(0.0, 1.0, len(q)))})]
+    executed = executed_programs(job, prepared.dialect, every, job.programs)[0].robots["arm"].q
+    inside, ends = executed.max(axis=0), executed[[0, -1]].max(axis=0)
+    joint = int(np.argmax(inside - ends))
+    assert inside[joint] - ends[joint] > 0.01
+    frame = job.frame
+    robot = frame.robot("arm")
+    upper = 0.5 * (inside[joint] + ends[joint])
+    joints = list(robot.model.joints)
+    joints[joint] = replace(joints[joint], upper=upper)
+    model = replace(robot.model, joints=tuple(joints))
+    cell = replace(frame.cell, robots=(replace(robot, model=model),))
+
+    message = refusal(prepared, replace(job, frame=replace(frame, cell=cell)), q)
+
+    assert re.search(
+        rf"task 'corner', .* mm along its seam: joint {joints[joint].name} of 'arm' leaves its limits", message
+    )
+
+
+def test_a_line_in_another_configuration_than_stated_is_refused(prepared: PreparedExport) -> None:
+    q = np.deg2rad([[-10.0, 25.0, 10.0, 5.0, 50.0, 10.0]]) + np.linspace(0.0, 1.0, 201)[:, None] * np.deg2rad(
+        [[5.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+    )
+    function = prepared.dialect.configuration
+    assert function is not None
+    stated = function(prepared.job.frame.robot("arm"), q[[0, -1]])
+    stated[1, 3] = 1 - stated[1, 3]
+
+    message = refusal(prepared, job_of_line(prepared, q, configuration=stated), q)
+
+    assert "task 'corner'" in message
+    assert "expected configuration" in message
+
+
+def test_a_line_at_a_speed_that_a_joint_cannot_follow_is_refused(prepared: PreparedExport) -> None:
+    q = np.deg2rad([[-10.0, 25.0, 10.0, 5.0, 50.0, 10.0]]) + np.linspace(0.0, 1.0, 201)[:, None] * np.deg2rad(
+        [[5.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+    )
+    job = job_of_line(prepared, q)
+    rows = replace(job.programs[0].robots["arm"], feeds=np.array([np.nan, 40.0]))
+
+    message = refusal(prepared, replace(job, programs=(ProgramRows(name=None, robots={"arm": rows}),)), q)
+
+    assert re.search(r"joint J\d of 'arm' would move at \d.* deg/s at 4e\+04 mm/s, allowed", message)
