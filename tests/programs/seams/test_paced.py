@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 from builders.commands import run_command
 
-from cellplan import open_gate
+from cellplan import load_cell, open_gate
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.geometry.transforms import Array, inverse, pose_from, quaternion_to_rotation
-from cellplan.model.report.exported import ExportJob, Moves, ProgramRows, Promise, RobotRows, Seam
+from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, ProgramRows, Promise, RobotRows, Seam, Station
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.dialects import DIALECTS
+from cellplan.programs.elements.frames import controller_base
 from cellplan.programs.export.choice import Choice
 from cellplan.programs.export.prepare import PreparedExport, prepare
 from cellplan.programs.export.written import judged
+from cellplan.programs.formats.rapid.writer import RAPID
 from cellplan.programs.judgement.compare_rows import other_rows
 from cellplan.programs.rows.rows import full_rows
 from cellplan.programs.seams.executed import executed_programs
@@ -81,6 +83,24 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> VerifiedRun:
 
 
 @pytest.fixture(scope="module")
+def frame(tmp_path_factory: pytest.TempPathFactory) -> ExportFrame:
+    """What a reader knows of a paced export of the cell, which is not solved."""
+    path = tmp_path_factory.mktemp("frame") / "cell.yaml"
+    path.write_text(CELL, encoding="utf-8")
+    cell = load_cell(path)
+    X = inverse(controller_base(cell.robot("arm"))) @ cell.part.X_CP
+    station = Station(tasks=("ring", "corner"), X=X, X_W=cell.part.X_CP)
+    return ExportFrame(
+        cell=cell,
+        robots=("arm",),
+        programs=(None,),
+        promise=Promise.PACED,
+        moves=Moves.LINEAR,
+        stations={"arm": (station,)},
+    )
+
+
+@pytest.fixture(scope="module")
 def prepared(run: VerifiedRun) -> PreparedExport:
     return prepare(run, DIALECTS["rapid"], Choice(moves=Moves.LINEAR))
 
@@ -113,6 +133,7 @@ def points(text: str, name: str) -> list[Array]:
     return [X_WP @ frame_of(match[1]) for match in targets.values() if match is not None]
 
 
+@pytest.mark.slow
 def test_points_lie_on_the_path_and_the_process_goes_on_and_off_at_its_ends(text: str) -> None:
     ring, corner = routine(text, "ring"), routine(text, "corner")
 
@@ -143,6 +164,7 @@ def test_points_lie_on_the_path_and_the_process_goes_on_and_off_at_its_ends(text
     )
 
 
+@pytest.mark.slow
 def test_joints_of_the_entry_bring_the_stated_tool_to_the_approach(text: str, run: VerifiedRun) -> None:
     """The tool in the turned flange of the controller is where the model has it."""
     robot = run.cell.robot("arm")
@@ -188,6 +210,7 @@ CHANGES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_change_is_noticed(change: str, prepared: PreparedExport, run: VerifiedRun, text: str) -> None:
     pattern, repl = CHANGES[change]
@@ -197,6 +220,7 @@ def test_a_change_is_noticed(change: str, prepared: PreparedExport, run: Verifie
     assert noticed(prepared, run, changed)
 
 
+@pytest.mark.slow
 def test_what_is_written_is_what_is_read(prepared: PreparedExport, run: VerifiedRun, text: str) -> None:
     dialect = prepared.dialect
     assert prepared.promised.promise is Promise.PACED
@@ -208,9 +232,9 @@ def test_what_is_written_is_what_is_read(prepared: PreparedExport, run: Verified
     assert 0.0 < tube[:, 0].max() <= 0.25 * 0.5e-3 + 1e-5  # the corner in process takes a quarter of its tolerance
 
 
-def job_of_line(prepared: PreparedExport, q: Array, *, configuration: Array | None = None) -> ExportJob:
+def job_of_line(frame: ExportFrame, q: Array, *, configuration: Array | None = None) -> ExportJob:
     """A seam of one line between the first and the last of some joints, shape (N, 6), which the run has between."""
-    robot = prepared.job.frame.robot("arm")
+    robot = frame.robot("arm")
     X_WP = robot.X_WB @ inverse(robot.X_WB)
     X_WP[:3, 3] = [1.0, 0.0, 0.3]
     X_PT = np.full((2, 4, 4), np.nan)
@@ -219,7 +243,7 @@ def job_of_line(prepared: PreparedExport, q: Array, *, configuration: Array | No
         robot="arm",
         q=q[[0, -1]],
         times=np.array([0.0, 1.0]),
-        process=np.array([True, False]),
+        process=np.zeros(2, dtype=bool),
         rounding=np.zeros(2),
         X_PT=X_PT,
         configuration=configuration,
@@ -227,38 +251,47 @@ def job_of_line(prepared: PreparedExport, q: Array, *, configuration: Array | No
         feeds=np.array([np.nan, 0.04]),
         middles=np.zeros(2, dtype=bool),
     )
-    return replace(prepared.job, programs=(ProgramRows(name=None, robots={"arm": rows}),))
+    return ExportJob(frame=frame, programs=(ProgramRows(name=None, robots={"arm": rows}),))
 
 
-def refusal(prepared: PreparedExport, job: ExportJob, q: Array) -> str:
+def test_a_seam_is_read_back(frame: ExportFrame) -> None:
+    q = np.deg2rad([[-10.0, 25.0, 10.0, 5.0, 50.0, 10.0], [-5.0, 25.0, 10.0, 5.0, 50.0, 10.0]])
+    job = job_of_line(frame, q)
+
+    read = RAPID.read(frame, RAPID.render(job))
+
+    assert list(other_rows(RAPID, job, read)) == []
+    assert read[0].robots["arm"].seams == (Seam(task="corner", first=0, last=1),)
+
+
+def refusal(frame: ExportFrame, job: ExportJob, q: Array) -> str:
     every = RobotRows(robot="arm", q=q, times=np.linspace(0.0, 1.0, len(q)))
     with pytest.raises(NotVerifiedError) as error:
-        executed_programs(job, prepared.dialect, [ProgramRows(name=None, robots={"arm": every})], job.programs)
+        executed_programs(job, RAPID, [ProgramRows(name=None, robots={"arm": every})], job.programs)
     return str(error.value)
 
 
-def test_a_line_that_flips_the_wrist_is_refused_with_task_length_and_joint(prepared: PreparedExport) -> None:
+def test_a_line_that_flips_the_wrist_is_refused_with_task_length_and_joint(frame: ExportFrame) -> None:
     """Only axis 5 turns, from one side to the other: a straight tool passes its zero beside the singular direction."""
     q = np.deg2rad([[0.0, 20.0, 10.0, 30.0, 25.0, 10.0]]) + np.linspace(0.0, 1.0, 201)[:, None] * np.deg2rad(
         [[8.0, 0.0, 0.0, 0.0, -50.0, 0.0]]
     )
 
-    message = refusal(prepared, job_of_line(prepared, q), q)
+    message = refusal(frame, job_of_line(frame, q), q)
 
     assert re.search(r"task 'corner', \d+\.\d mm along its seam: .* joint J\d of 'arm' passes near", message)
 
 
-def test_a_line_that_leaves_a_limit_between_its_ends_is_refused(prepared: PreparedExport) -> None:
+def test_a_line_that_leaves_a_limit_between_its_ends_is_refused(frame: ExportFrame) -> None:
     q = np.deg2rad([[-25.0, 25.0, 10.0, 5.0, 50.0, 10.0]]) + np.linspace(0.0, 1.0, 201)[:, None] * np.deg2rad(
         [[50.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
     )
-    job = job_of_line(prepared, q)
+    job = job_of_line(frame, q)
     every = [ProgramRows(name=None, robots={"arm": RobotRows(robot="arm", q=q, times=np.linspace(0.0, 1.0, len(q)))})]
-    executed = executed_programs(job, prepared.dialect, every, job.programs)[0].robots["arm"].q
+    executed = executed_programs(job, RAPID, every, job.programs)[0].robots["arm"].q
     inside, ends = executed.max(axis=0), executed[[0, -1]].max(axis=0)
     joint = int(np.argmax(inside - ends))
     assert inside[joint] - ends[joint] > 0.01
-    frame = job.frame
     robot = frame.robot("arm")
     upper = 0.5 * (inside[joint] + ends[joint])
     joints = list(robot.model.joints)
@@ -266,35 +299,35 @@ def test_a_line_that_leaves_a_limit_between_its_ends_is_refused(prepared: Prepar
     model = replace(robot.model, joints=tuple(joints))
     cell = replace(frame.cell, robots=(replace(robot, model=model),))
 
-    message = refusal(prepared, replace(job, frame=replace(frame, cell=cell)), q)
+    message = refusal(frame, replace(job, frame=replace(frame, cell=cell)), q)
 
     assert re.search(
         rf"task 'corner', .* mm along its seam: joint {joints[joint].name} of 'arm' leaves its limits", message
     )
 
 
-def test_a_line_in_another_configuration_than_stated_is_refused(prepared: PreparedExport) -> None:
+def test_a_line_in_another_configuration_than_stated_is_refused(frame: ExportFrame) -> None:
     q = np.deg2rad([[-10.0, 25.0, 10.0, 5.0, 50.0, 10.0]]) + np.linspace(0.0, 1.0, 201)[:, None] * np.deg2rad(
         [[5.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
     )
-    function = prepared.dialect.configuration
+    function = RAPID.configuration
     assert function is not None
-    stated = function(prepared.job.frame.robot("arm"), q[[0, -1]])
+    stated = function(frame.robot("arm"), q[[0, -1]])
     stated[1, 3] = 1 - stated[1, 3]
 
-    message = refusal(prepared, job_of_line(prepared, q, configuration=stated), q)
+    message = refusal(frame, job_of_line(frame, q, configuration=stated), q)
 
     assert "task 'corner'" in message
     assert "expected configuration" in message
 
 
-def test_a_line_at_a_speed_that_a_joint_cannot_follow_is_refused(prepared: PreparedExport) -> None:
+def test_a_line_at_a_speed_that_a_joint_cannot_follow_is_refused(frame: ExportFrame) -> None:
     q = np.deg2rad([[-10.0, 25.0, 10.0, 5.0, 50.0, 10.0]]) + np.linspace(0.0, 1.0, 201)[:, None] * np.deg2rad(
         [[5.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
     )
-    job = job_of_line(prepared, q)
+    job = job_of_line(frame, q)
     rows = replace(job.programs[0].robots["arm"], feeds=np.array([np.nan, 40.0]))
 
-    message = refusal(prepared, replace(job, programs=(ProgramRows(name=None, robots={"arm": rows}),)), q)
+    message = refusal(frame, replace(job, programs=(ProgramRows(name=None, robots={"arm": rows}),)), q)
 
     assert re.search(r"joint J\d of 'arm' would move at \d.* deg/s at 4e\+04 mm/s, allowed", message)
