@@ -111,7 +111,7 @@ STATEMENTS: Final[Mapping[str, tuple[Switch, ...]]] = {
     "staubli": (
         _same(
             "doArc=true",
-            r"(?P<name>do\w{1,13}(?:\[\d{1,4}\])?) ?= ?(?P<state>true|false)",
+            r"(?P<name>do\w{1,13}) ?= ?(?P<state>true|false)",
             has_case=True,
             is_output=True,
         ),

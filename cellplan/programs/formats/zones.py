@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array, rotation_about
 from cellplan.model.cell.cell import Robot
+from cellplan.model.report.exported import RobotRows
 from cellplan.programs.elements.corners import LARGEST_SHARE
+from cellplan.programs.elements.paced import Move
 
 HALVINGS: Final = 24  # of the search for a share, to 3e-8
 STANDS: Final = 1e-9  # [rad] or [m] axes that move less in a segment do not count
@@ -105,6 +107,15 @@ def part_shares(p: Array, zones: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(zones > 0.0, zones / np.min(lengths, axis=0), 0.0)
     return np.where(np.isnan(shares), LARGEST_SHARE, np.minimum(shares, LARGEST_SHARE))
+
+
+def shares_off_seams(moves: Sequence[Move], rows: RobotRows) -> Array:
+    """Shares within which moves of joints round each row, shape (N,); the tool says how near only between such rows."""
+    shares, is_joint = np.zeros(len(rows)), ~rows.on_seam
+    for move in moves:
+        is_between = bool(np.all(is_joint[max(move.row - 1, 0) : move.row + 2]))
+        shares[move.row] = move.share if is_between else 0.0
+    return shares
 
 
 def _away(robot: Robot, q: Array, other: Array, share: Array) -> Array:

@@ -129,7 +129,10 @@ class SeamExecution:
                 raise NotVerifiedError([f"task '{seam.task}': row {last}: no arc of at most 120 deg leads through it"])
             path = self._path(seam, (first, last), shape, X_WP, (q, travelled))
             paths.append((last, path))
-            self._require_configuration(seam, last, path.q[-1:], MM * (travelled + shape.length))
+            for row in range(first + 1, last + 1):
+                share = 1.0 if row == last else float(shape.shares(rows.X_PT[row, None, :3, 3])[0])
+                q_there = np.array([np.interp(share, path.shares, column) for column in path.q.T])
+                self._require_configuration(seam, row, q_there[None], MM * (travelled + share * shape.length))
             X, travelled, q, first = end, travelled + shape.length, path.q[-1], last
         yield from self._with_corners(seam, paths)
 

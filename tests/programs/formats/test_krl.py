@@ -317,7 +317,7 @@ def test_robots_may_keep_other_rows_but_meet_equally_often() -> None:
 
 
 def test_the_format_promises_one_arm_in_step_and_else_the_sequence_only() -> None:
-    assert KRL.promises == (Promise.SYNCHRONISED, Promise.SEQUENCE_ONLY)
+    assert KRL.promises == (Promise.SYNCHRONISED, Promise.PACED, Promise.SEQUENCE_ONLY)
     assert KRL.most_arms == 1
     assert KRL.is_thinned
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from builders.seam_jobs import KUKA_ZERO, STAUBLI_VALVE, UR_VALVE, VALVE, seam_job
 from builders.shown_jobs import (
     NAMES,
     NUMBERS,
@@ -28,7 +29,10 @@ Shown = Sequence[tuple[ExportJob, Sequence[str]]]
 PAGES: dict[str, Shown] = {
     "fanuc_ls": [(motion_groups(), ["R30.ls"]), (waiting_fanucs(), ["WELD.ls"])],
     "json": [(timed_table(), ["program.json"])],
-    "krl": [(waiting_arms("kuka", NUMBERS), ["weld.src", "weld.dat"])],
+    "krl": [
+        (waiting_arms("kuka", NUMBERS), ["weld.src", "weld.dat"]),
+        (seam_job("kuka", controller=KUKA_ZERO, process=VALVE), ["alpha.src", "alpha.dat"]),
+    ],
     "rapid": [
         (arm_and_positioner(), ["weld.mod", "weld.pgf", "table.mod"]),
         (waiting_arms("abb", NAMES), ["weld.mod"]),
@@ -38,9 +42,11 @@ PAGES: dict[str, Shown] = {
     "urscript": [
         (servoed_arm(), ["weld.script"]),
         (waiting_arms("ur", STANDARD), ["weld.script"]),
+        (seam_job("ur", process=UR_VALVE), ["alpha.script"]),
     ],
     "val3": [
         (waiting_arms("staubli", NUMBERS), ["weld/weld.pjx", "weld/weld.dtx", "weld/start.pgx"]),
+        (seam_job("staubli", process=STAUBLI_VALVE), ["alpha/seam.pgx", "alpha/alpha.dtx"]),
     ],
 }
 

@@ -338,8 +338,8 @@ def test_robots_may_keep_other_rows_but_meet_equally_often() -> None:
         VAL3.render(never)
 
 
-def test_the_format_promises_the_sequence_only() -> None:
-    assert VAL3.promises == (Promise.SEQUENCE_ONLY,)
+def test_the_format_promises_no_times() -> None:
+    assert VAL3.promises == (Promise.PACED, Promise.SEQUENCE_ONLY)
     assert VAL3.is_thinned
 
 

@@ -138,7 +138,7 @@ DATA = {
     "no size": (' size="20"', "", '    <Data name="jRow"'),
     "no name": (' name="jRow"', "", '    <Data access="public" xsi:type="array" type="jointRx"'),
     "no type": (' type="jointRx"', "", '    <Data name="jRow"'),
-    "other type": ('type="jointRx"', 'type="pointRx"', '    <Data name="jRow"'),
+    "other type": ('type="jointRx"', 'type="pointRx"', '      <Value key="0" j1'),
     "joints of another arm": ('type="jointRx"', 'type="jointRs"', '    <Data name="jRow"'),
     "no array": ('xsi:type="array" type="jointRx"', 'xsi:type="collection" type="jointRx"', '    <Data name="jRow"'),
     "other access": (

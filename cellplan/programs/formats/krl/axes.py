@@ -4,10 +4,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from cellplan.errors import InputError
 from cellplan.model.report.exported import ExportFrame, Promise
 from cellplan.programs.elements.joints import Axes
 from cellplan.programs.elements.pages import require_six_axes
+from cellplan.programs.formats.krl.poses import status_and_turn
+from cellplan.programs.formats.krl.seams import require_rest
 from cellplan.programs.formats.krl.text import EXTERNAL, require_numbers
 
 
@@ -36,6 +40,11 @@ def demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
         yield partial(require_numbers, frame, robot)
         yield partial(require_six_axes, frame.robot(robot), external=EXTERNAL, what="KRL")
         yield partial(_require_places, frame, robot)
+        for station in frame.stations.get(robot, ()):
+            yield partial(require_rest, robot, station)
+        if frame.promise is Promise.PACED:
+            placed = frame.robot(robot)
+            yield partial(status_and_turn, placed, np.zeros((1, len(placed.model.joints))))
 
 
 def _require_places(frame: ExportFrame, arm: str) -> None:

@@ -30,11 +30,11 @@ PUBLIC PULSE REAL REPEAT RESUME RETURN SCIRC SEC SEMA SIGNAL SIN SLIN SPL SPLINE
 STRUC SWITCH SWRITE TAN THEN TIME_BLOCK TO TOOL_DATA TRIGGER TRUE UNTIL USER WAIT WHEN WHILE WITH
 """
 MODULES: Final = ProgramNames(NAME, frozenset(_WORDS.split()), POINT_NAME)
-_NUMBER: Final = r"[-+]?[0-9]{1,7}(?:\.[0-9]{1,12})?"
+NUMBER: Final = r"[-+]?[0-9]{1,7}(?:\.[0-9]{1,12})?"
 _BOOL: Final = r"(TRUE|FALSE)"
 STATEMENTS: Final = {
     "PTP": r"PTP\s+(\w+)(?:\s+(C_PTP))?",
-    "VEL_PTP": rf"BAS\s*\(\s*#VEL_PTP\s*,\s*({_NUMBER})\s*\)",
+    "VEL_PTP": rf"BAS\s*\(\s*#VEL_PTP\s*,\s*({NUMBER})\s*\)",
     "INITMOV": r"BAS\s*\(\s*#INITMOV\s*,\s*0\s*\)",
     "ADVANCE": r"\$ADVANCE\s*=\s*([0-9]+)",
     "TOOL": r"\$TOOL\s*=\s*(?:TOOL_DATA\s*\[\s*([0-9]+)\s*\]|\$NULLFRAME)",
@@ -48,7 +48,7 @@ _PATTERNS: Final = {kind: re.compile(text, re.IGNORECASE) for kind, text in STAT
 _EXT: Final = re.compile(r"EXT\s+(\w+)\s*\(\s*(.*?)\s*\)", re.IGNORECASE)
 _EXT_BAS: Final = re.compile(r"BAS_COMMAND\s*:\s*IN\s*,\s*REAL\s*:\s*IN", re.IGNORECASE)
 _POINT: Final = re.compile(r"(?:DECL\s+)?E6AXIS\s+(\w+)\s*=\s*\{\s*(?:E6AXIS\s*:)?\s*(.*?)\s*\}", re.IGNORECASE)
-_COMPONENT: Final = re.compile(rf"([AE][1-6])\s+({_NUMBER})", re.IGNORECASE)
+_COMPONENT: Final = re.compile(rf"([AE][1-6])\s+({NUMBER})", re.IGNORECASE)
 _FIRST: Final = re.compile(r"(DEF|DEFDAT)\s+(\w+)\s*(\(\s*\)|)(?:\s+PUBLIC)?", re.IGNORECASE)
 
 
@@ -86,7 +86,7 @@ def read_module(left: dict[str, str], path: str) -> KrlModule:
         if file not in left:
             raise InputError(f"{file}: expected a file, got none")
     name = path.rpartition("/")[2]
-    source, data = (_lines(left.pop(file), file) for file in files)
+    source, data = (source_lines(left.pop(file), file) for file in files)
     externals, statements = _source(_body(files[0], source, ("DEF", name, "END")))
     points, lines = _data(_body(files[1], data, ("DEFDAT", name, "ENDDAT")))
     return KrlModule(path=path, externals=externals, statements=statements, end=source[-1], points=points, lines=lines)
@@ -127,7 +127,7 @@ def _data(lines: Sequence[Statement]) -> tuple[dict[str, Sequence[float]], dict[
         point = match[1].lower()
         if point in points or len(point) > NAME or not point[0].isalpha():
             raise line.error(f"names of points that differ, of at most {NAME} characters", match[1])
-        points[point], count = _components(line, match[2])
+        points[point], count = read_components(line, match[2])
         declared[point] = line
         counts.add(count)
         if len(counts) > 1:
@@ -135,7 +135,7 @@ def _data(lines: Sequence[Statement]) -> tuple[dict[str, Sequence[float]], dict[
     return points, declared
 
 
-def _components(line: Statement, text: str) -> tuple[list[float], int]:
+def read_components(line: Statement, text: str) -> tuple[list[float], int]:
     """Values of all axes of a point, not a number for absent external ones, and how many are present."""
     components: dict[str, float] = {}
     for part in text.split(","):
@@ -161,7 +161,7 @@ def _body(file: str, lines: Sequence[Statement], words: tuple[str, str, str]) ->
     return lines[1:-1]
 
 
-def _lines(text: str, file: str) -> list[Statement]:
+def source_lines(text: str, file: str) -> list[Statement]:
     """Lines without comments, empty ones and the header; refuses what no such file has."""
     parts = split_lines(text, file)
     if parts[-1]:

@@ -1,19 +1,19 @@
 """KUKA KRL: a module of a .src and a .dat file for each arm, one PTP motion to each row, pages as subprograms."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import chain, zip_longest
+from itertools import chain
 from math import floor
 from typing import Final
 
 import numpy as np
 
 from cellplan.errors import raise_findings, refusals
-from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise
+from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, ProgramRows, Promise
 from cellplan.programs.elements.corners import LARGEST_SHARE, moves, row_shares
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.handshake import HandshakeStep
+from cellplan.programs.elements.paced import moves_of
 from cellplan.programs.elements.pages import (
     PagedProgram,
     paged,
@@ -21,10 +21,13 @@ from cellplan.programs.elements.pages import (
     render_programs,
     shares_as_written,
 )
-from cellplan.programs.elements.text import comment, fixed, joined
+from cellplan.programs.elements.text import comment, joined
 from cellplan.programs.formats.krl.axes import demands, moved_robots, order_of_axes, played_robots
+from cellplan.programs.formats.krl.poses import components, status_and_turn
 from cellplan.programs.formats.krl.reader import read_krl
-from cellplan.programs.formats.krl.text import AXES, MODULES, POINT, WHOLE
+from cellplan.programs.formats.krl.seams import MODES, SeamWriter, krl_events, routine_names, signal_text, tool_text
+from cellplan.programs.formats.krl.seams_reader import read_seams
+from cellplan.programs.formats.krl.text import MODULES, POINT, WHOLE
 
 DECIMALS: Final = 5
 PAGE: Final = 1000  # rows; public programs are split at 1400 to 2500 lines
@@ -41,6 +44,10 @@ def render_krl(job: ExportJob) -> dict[str, str]:
     """
     raise_findings(refusals(*demands(job.frame, 0)))
     paths, files = _paths(job.frame), dict[str, str]()
+    if job.frame.promise is Promise.PACED:
+        for (name, robot), path in paths.items():
+            files |= _with_seams(job, next(it for it in job.programs if it.name == name), robot, path)
+        return files
     if job.frame.promise is not Promise.SYNCHRONISED:
         return render_programs(job, KRL, paths, partial(_files, job.frame))
     for program in job.programs:
@@ -52,6 +59,26 @@ def render_krl(job: ExportJob) -> dict[str, str]:
 def _paths(frame: ExportFrame) -> dict[tuple[str | None, str], str]:
     """Path of each program without an ending, by its name and robot."""
     return program_paths(played_robots(frame), KRL, MODULES)
+
+
+def _with_seams(job: ExportJob, program: ProgramRows, robot: str, path: str) -> dict[str, str]:
+    """The files of a robot with seams."""
+    part = paged(job, KRL, program, robot, path)
+    part = replace(part, numbers=part.numbers[:, order_of_axes(job.frame, robot)])
+    seams = SeamWriter(
+        frame=job.frame,
+        program=part,
+        moves=moves_of(job, program, krl_events(job.frame, robot)),
+        names=routine_names(job.frame, robot, part.name),
+    )
+    routines = seams.routines()
+    head = [line for note in part.notes for line in comment(note, ";")]
+    setup = ["BAS(#INITMOV,0)", f"$ADVANCE={ADVANCE}", *MODES, f"$TOOL={tool_text(part.placed)}", "$BASE=$NULLFRAME"]
+    source = [*HEADER, f"DEF {part.name}()", *head, *setup, *routines.pop(""), "END"]
+    for name, statements in routines.items():
+        source += ["", f"DEF {name}()", *statements, "END"]
+    data = [*HEADER, f"DEFDAT {part.name}", *head, *seams.points(), "ENDDAT"]
+    return {f"{path}.src": joined(source, line_end=LINE_END), f"{path}.dat": joined(data, line_end=LINE_END)}
 
 
 def _files(frame: ExportFrame, program: PagedProgram) -> dict[str, str]:
@@ -100,7 +127,7 @@ def _setup(program: PagedProgram) -> list[str]:
         f"$ADVANCE={ADVANCE}",
         f"$TOOL={f'TOOL_DATA[{tool}]' if tool else '$NULLFRAME'}",
         f"$BASE={f'BASE_DATA[{base}]' if base else '$NULLFRAME'}",
-        *map(_instruction, program.first),
+        *map(signal_text, program.first),
     ]
 
 
@@ -117,15 +144,8 @@ def _moves(program: PagedProgram, page: range) -> list[str]:
             lines.append(f"$APO.CPTP={rounding}")
         lines.append(f"PTP {POINT}{row + 1}{' C_PTP' if share else ''}")
         if row in marks:
-            lines += [_instruction(step) for step in program.steps]
+            lines += [signal_text(step) for step in program.steps]
     return lines
-
-
-def _instruction(step: HandshakeStep) -> str:
-    """One step of a handshake. Both kinds stop the advance run: they are done when the robot stands at the row."""
-    if step.waits:
-        return f"WAIT FOR {'' if step.is_on else 'NOT '}$IN[{step.signal}]"
-    return f"$OUT[{step.signal}]={'TRUE' if step.is_on else 'FALSE'}"
 
 
 def _module(
@@ -136,25 +156,27 @@ def _module(
     source = [*HEADER, f"DEF {name}()", *head, *(f"EXT {call}" for call in calls), *statements, "END"]
     numbers = program.numbers[page.start : page.stop].tolist()
     points = [
-        f"DECL E6AXIS {POINT}{row + 1}={{{_components(values, program.decimals)}}}"
+        f"DECL E6AXIS {POINT}{row + 1}={{{components(values, program.decimals)}}}"
         for row, values in zip(page, numbers, strict=True)
     ]
     data = [*HEADER, f"DEFDAT {name}", *head, *points, "ENDDAT"]
     return {f"{path}.src": joined(source, line_end=LINE_END), f"{path}.dat": joined(data, line_end=LINE_END)}
 
 
-def _components(values: Sequence[float], decimals: int) -> str:
-    """Components of a point: all axes of the arm, then all external ones, unused ones at zero."""
-    return ",".join(f"{axis} {fixed(value, decimals)}" for axis, value in zip_longest(AXES, values, fillvalue=0.0))
+def _read(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
+    """What the files say, by the reader of lines and arcs where there may be some."""
+    return (read_seams if frame.promise is Promise.PACED else read_krl)(frame, files, _paths(frame))
 
 
 KRL: Final[Dialect] = Dialect(
     name="krl",
     title="KUKA KRL: a .src and a .dat file for each robot",
     render=render_krl,
-    read=lambda frame, files: read_krl(frame, files, _paths(frame)),
+    read=_read,
     decimals=DECIMALS,
-    promises=(Promise.SYNCHRONISED, Promise.SEQUENCE_ONLY),
+    promises=(Promise.SYNCHRONISED, Promise.PACED, Promise.SEQUENCE_ONLY),
+    moves=(Moves.JOINTS, Moves.LINEAR),
+    configuration=status_and_turn,
     most_arms=1,
     kinds=frozenset({"kuka"}),
     is_thinned=True,

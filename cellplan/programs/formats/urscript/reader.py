@@ -1,19 +1,20 @@
 """Reader of URScript programs: statements of our own subset, one on each line, and the handshakes among them."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from cellplan.errors import InputError
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ProgramRows, Promise, RobotRows
 from cellplan.programs.elements.joints import ARM, Angle, from_numbers
-from cellplan.programs.elements.text import line_error, lines_of, mismatch_error, truncated_error
+from cellplan.programs.elements.text import line_error, mismatch_error
 from cellplan.programs.elements.timed_rows import cycle_of, file_path, require_paths
 from cellplan.programs.formats.urscript.rows import move_acceleration
+from cellplan.programs.formats.urscript.seams_reader import SeamReader
+from cellplan.programs.formats.urscript.statements import Statements, UrscriptStatement, compact
 from cellplan.programs.formats.urscript.text import (
     ENDING,
     approach_call,
@@ -22,96 +23,14 @@ from cellplan.programs.formats.urscript.text import (
     handshake_lines,
     lowering,
     most_rows,
-    page_name,
     require_turns,
     servo_call,
     stop_call,
 )
 from cellplan.programs.formats.zones import tool_shares
 
-MOVES: Final = ("movej", "servoj")  # instructions of rows
-_GAP: Final = re.compile(r"\s*([()\[\],=:])\s*")
 _SPEED: Final = r"(?!0\.0+(?![0-9]))(?:0|[1-9][0-9]{0,3})\.[0-9]{3}"
 _RADIUS: Final = r"(?!0\.0+(?![0-9]))[0-9]\.[0-9]{4}"
-
-
-class UrscriptStatement(NamedTuple):
-    """One instruction: its line, from 1, its text without comment and spare spaces, and the line as it stands."""
-
-    line: int
-    text: str
-    shown: str
-
-
-class _Statements:
-    """Instructions of a file, taken one after the other."""
-
-    def __init__(self, text: str, file: str) -> None:
-        """Find all instructions."""
-        self.file, self.place = file, 0
-        lines = lines_of(text, file)
-        self.all = [
-            UrscriptStatement(number, plain, content)
-            for number, line in enumerate(lines, start=1)
-            if (content := line.partition("#")[0].strip()) and (plain := compact(content))
-        ]
-        self.last = len(lines)
-
-    def call_routines(self, most: int) -> None:
-        """Put the instructions of routines, of at most so many rows, where the program calls them in order."""
-        inside, called = list[UrscriptStatement](), list[str]()
-        while self.peek().text.startswith("def "):
-            called.append(page_name(len(called) + 1))
-            self.take(f"def {called[-1]}():")
-            inside += self._routine(most)
-        if not called:
-            self._require_length([statement for statement in self.all if statement.text.startswith(MOVES)], most)
-            return
-        start = self.place
-        while self.peek().text != f"{called[0]}()":
-            self.place += 1
-        begin = self.all[start : self.place]
-        for name in called:
-            self.take(f"{name}()")
-        if moves := [statement for statement in begin if statement.text.startswith(MOVES)]:
-            raise line_error(self.file, moves[0].line, f"{called[0]}()", moves[0].shown)
-        self.all, self.place = [*begin, *inside, *self.all[self.place :]], 0
-
-    def _routine(self, most: int) -> list[UrscriptStatement]:
-        """The instructions of a routine up to its end."""
-        statements, depth = list[UrscriptStatement](), 1
-        while depth:
-            at = self.peek()
-            depth += at.text.startswith("while ") - (at.text == "end")
-            statements.append(at)
-            self.place += 1
-        self._require_length([statement for statement in statements if statement.text.startswith(MOVES)], most)
-        return statements[:-1]
-
-    def _require_length(self, moves: Sequence[UrscriptStatement], most: int) -> None:
-        """Refuse more rows than a routine holds."""
-        if len(moves) > most:
-            line = moves[most].line
-            raise InputError(f"{self.file}:{line}: expected {most} rows at most in a routine, got {len(moves)}")
-
-    def peek(self) -> UrscriptStatement:
-        """The next instruction; ``InputError`` where there is none."""
-        if self.place == len(self.all):
-            raise truncated_error(self.file, self.last, "an instruction")
-        return self.all[self.place]
-
-    def take(self, expected: str) -> None:
-        """Go past an instruction that has to be a given one."""
-        statement = self.peek()
-        if statement.text != compact(expected):
-            raise line_error(self.file, statement.line, expected.strip(), statement.shown)
-        self.place += 1
-
-    def end(self) -> None:
-        """Make sure that nothing follows."""
-        if self.place < len(self.all):
-            statement = self.all[self.place]
-            raise line_error(self.file, statement.line, "the end of the file", statement.shown)
 
 
 def read_urscript(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
@@ -124,20 +43,18 @@ def read_urscript(frame: ExportFrame, files: Mapping[str, str]) -> tuple[Program
         robots = {}
         for robot in frame.robots:
             path = paths[program, robot]
-            statements = _Statements(files[path], path)
+            statements = Statements(files[path], path)
             statements.take(f"def {names[program, robot]}():")
-            statements.call_routines(most_rows(frame))
-            read = _timed if frame.promise is Promise.TIMED else _sequence
-            robots[robot] = read(frame, frame.robot(robot), statements)
+            if frame.promise is Promise.PACED:
+                robots[robot] = SeamReader(frame, frame.robot(robot), statements).rows()
+            else:
+                statements.call_routines(most_rows(frame))
+                read = _timed if frame.promise is Promise.TIMED else _sequence
+                robots[robot] = read(frame, frame.robot(robot), statements)
             statements.take("end")
             statements.end()
         programs.append(ProgramRows(name=program, robots=robots))
     return tuple(programs)
-
-
-def compact(text: str) -> str:
-    """An instruction with single spaces between words, and none beside brackets and signs."""
-    return _GAP.sub(r"\1", " ".join(text.split()))
 
 
 class _Points:
@@ -158,7 +75,7 @@ class _Points:
         self.pattern = rf"\[({number}(?:,{number}){{{ARM - 1}}})\]"
         self.expected = f"{ARM} positions with {decimals} decimals"
 
-    def add(self, statements: _Statements, pattern: re.Pattern[str], what: str) -> re.Match[str]:
+    def add(self, statements: Statements, pattern: re.Pattern[str], what: str) -> re.Match[str]:
         """Take in the row of the next instruction, which has to match the pattern."""
         statement = statements.peek()
         match = pattern.fullmatch(statement.text)
@@ -183,7 +100,7 @@ class _Points:
         )
 
 
-def _timed(frame: ExportFrame, robot: Robot, statements: _Statements) -> RobotRows:
+def _timed(frame: ExportFrame, robot: Robot, statements: Statements) -> RobotRows:
     """Rows of a program that follows them at the cycle of its controller."""
     points = _Points(frame, robot, statements.file)
     servo = re.compile(rf"servoj\({points.pattern},{re.escape(compact(servo_call(frame, robot)))}\)")
@@ -196,13 +113,13 @@ def _timed(frame: ExportFrame, robot: Robot, statements: _Statements) -> RobotRo
     return points.rows(times=True)
 
 
-def _approach(points: _Points, statements: _Statements) -> None:
+def _approach(points: _Points, statements: Statements) -> None:
     """The move to the first row."""
     pattern = re.compile(rf"movej\({points.pattern},{re.escape(compact(approach_call()))}\)")
     points.add(statements, pattern, f"movej([…], {approach_call()})")
 
 
-def _sequence(frame: ExportFrame, robot: Robot, statements: _Statements) -> RobotRows:
+def _sequence(frame: ExportFrame, robot: Robot, statements: Statements) -> RobotRows:
     """Rows and marks of a program that moves from row to row."""
     points, marks, radii = _Points(frame, robot, statements.file), list[int](), [0.0]
     acceleration = re.escape(f"{move_acceleration(robot):.3f}")
@@ -239,7 +156,7 @@ def _require_speed(robot: Robot, speed: float, statement: UrscriptStatement, fil
         raise line_error(file, statement.line, f"a speed of {largest:.3f} rad/s at most", statement.shown)
 
 
-def _meet(frame: ExportFrame, robot: Robot, statements: _Statements) -> None:
+def _meet(frame: ExportFrame, robot: Robot, statements: Statements) -> None:
     """The handshake of a robot at a mark."""
     lines = handshake_lines(frame, robot.name)
     if not lines:

@@ -10,7 +10,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, Promise
 from cellplan.model.settings.units import si_or_none
-from cellplan.programs.elements.handshake import handshake_steps, lowering_step, signals_by_key
+from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step, signals_by_key
 from cellplan.programs.elements.joints import ARM
 from cellplan.programs.elements.pages import MOST_PAGES
 from cellplan.programs.elements.text import safe_names
@@ -114,12 +114,16 @@ def handshake_lines(frame: ExportFrame, robot: str) -> list[str]:
     lines = []
     for step in handshake_steps(frame, robot):
         require_standard_signals(frame, robot)
-        if step.waits:
-            state = "not " if step.is_on else ""
-            lines += [f"while {state}get_standard_digital_in({step.signal}):", "  sync()", "end"]
-        else:
-            lines.append(f"set_standard_digital_out({step.signal}, {step.is_on})")
+        lines += signal_lines(step)
     return lines
+
+
+def signal_lines(step: HandshakeStep) -> list[str]:
+    """One instruction of a handshake, by standard digital signals."""
+    if not step.waits:
+        return [f"set_standard_digital_out({step.signal}, {step.is_on})"]
+    state = "not " if step.is_on else ""
+    return [f"while {state}get_standard_digital_in({step.signal}):", "  sync()", "end"]
 
 
 def lowering(frame: ExportFrame, robot: str) -> str:

@@ -2,7 +2,8 @@
 
 ``timed``: the first row by ``movej``, each further one by ``servoj`` at the cycle of the controller, ``stopj`` at the
 end. ``servoj`` follows its rows with a lag, its lookahead time, which the cell states as the latency of the controller.
-``sequence only``: one ``movej`` per row, and at marks a handshake by standard digital signals.
+``sequence only``: one ``movej`` per row, and at marks a handshake by standard digital signals. ``paced``: likewise, and
+``movel`` and ``movec`` on seams.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -13,16 +14,18 @@ import numpy as np
 
 from cellplan.errors import InputError, raise_findings, refusals
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ExportFrame, ExportJob, Promise, RobotRows
+from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, Promise, RobotRows
 from cellplan.programs.elements.corners import chosen_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.joints import Angle, to_numbers
+from cellplan.programs.elements.paced import moves_of
 from cellplan.programs.elements.pages import pages_of
 from cellplan.programs.elements.text import comment, joined
 from cellplan.programs.elements.timed_rows import cycle_of, file_path, times_of
 from cellplan.programs.formats.urscript.reader import read_urscript
 from cellplan.programs.formats.urscript.rows import blend_radii, move_acceleration, move_speeds
+from cellplan.programs.formats.urscript.seams import SeamWriter, require_rest, routine_names, urscript_events
 from cellplan.programs.formats.urscript.text import (
     DECIMALS,
     ENDING,
@@ -54,9 +57,16 @@ def render_urscript(job: ExportJob) -> dict[str, str]:
             robot, rows = job.frame.robot(name), program.robots[name]
             path = file_path(program.name, f"{name}{ENDING}")
             points = _points(robot, rows, decimals_of_urscript(job.frame, robot))
-            is_timed = job.frame.promise is Promise.TIMED
-            at_rows = (_timed if is_timed else _sequence)(job, robot, rows, points)
-            body = [*_routines(job, rows, at_rows), *([stop_call(robot)] if is_timed else [])]
+            if job.frame.promise is Promise.PACED:
+                moves = moves_of(job, program, urscript_events(job.frame, name))
+                seams = SeamWriter(
+                    frame=job.frame, robot=robot, rows=rows, moves=moves, names=routine_names(job.frame, name)
+                )
+                body = seams.lines(points)
+            else:
+                is_timed = job.frame.promise is Promise.TIMED
+                at_rows = (_timed if is_timed else _sequence)(job, robot, rows, points)
+                body = [*_routines(job, rows, at_rows), *([stop_call(robot)] if is_timed else [])]
             head = [line for note in _notes(job, rows) for line in comment(note, "#")]
             files[path] = joined([*head, f"def {names[program.name, name]}():", *("  " + line for line in body), "end"])
     return files
@@ -70,6 +80,8 @@ def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
             yield partial(servo_call, frame, frame.robot(name))
         else:
             yield partial(require_standard_signals, frame, name)
+        for station in frame.stations.get(name, ()):
+            yield partial(require_rest, name, station)
 
 
 def _notes(job: ExportJob, rows: RobotRows) -> Iterator[str]:
@@ -129,7 +141,8 @@ URSCRIPT: Final[Dialect] = Dialect(
     render=render_urscript,
     read=read_urscript,
     decimals=DECIMALS,
-    promises=(Promise.TIMED, Promise.SEQUENCE_ONLY),
+    promises=(Promise.TIMED, Promise.PACED, Promise.SEQUENCE_ONLY),
+    moves=(Moves.JOINTS, Moves.LINEAR),
     kinds=frozenset({"ur"}),
     at_cycle=True,
     is_thinned=True,

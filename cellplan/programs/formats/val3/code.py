@@ -13,6 +13,9 @@ _ITEM: Final = rf"({_NAME})(?:\s*\[\s*(\w+)\s*\])?"
 _FIRST: Final = rf"({_NAME})(?:\s*\[\s*0\s*\])?"
 STATEMENTS: Final = {
     "MOVE": rf"movej\s*\(\s*{_ITEM}\s*,\s*{_ITEM}\s*,\s*{_ITEM}\s*\)",  # data of joints, tool, motion descriptor
+    "LINE": rf"movel\s*\(\s*{_ITEM}\s*,\s*{_ITEM}\s*,\s*{_ITEM}\s*\)",  # data of a point, tool, motion descriptor
+    "ARC": rf"movec\s*\(\s*{_ITEM}\s*,\s*{_ITEM}\s*,\s*{_ITEM}\s*,\s*{_ITEM}\s*\)",
+    "DELAY": r"delay\s*\(\s*[0-9]+\.[0-9]+\s*\)",
     "STAND": r"waitEndMove\s*\(\s*\)",
     "RESET": r"resetMotion\s*\(\s*\)",
     "WAIT": rf"wait\s*\(\s*{_FIRST}\s*==\s*(true|false)\s*\)",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from cellplan.errors import InputError
-from cellplan.programs.formats.val3.names import BASE, FLANGE, NAME, TOOL_NAME
+from cellplan.programs.formats.val3.names import BASE, FLANGE, NAME, PART, TOOL_NAME
 from cellplan.programs.formats.val3.xml import DATA_SPACE, TYPE, Val3Element, parse
 
 _JOINTS: Final = tuple(f"j{axis}" for axis in range(1, 7))
@@ -28,6 +28,7 @@ _KINDS: Final = {
     "jointRx": _Kind(_JOINTS),
     "tool": _Kind(_POSE, needed=("fatherId",), texts=("ioLink",)),
     "frame": _Kind(_POSE, needed=("fatherId",)),
+    "pointRx": _Kind(_POSE, needed=("fatherId",)),
     "mdesc": _Kind(_SHARES, texts=("blend",)),
     "dio": _Kind(needed=("link",)),
     "num": _Kind(("value",)),
@@ -100,6 +101,8 @@ def _value(value: Val3Element, key: int, kind: str) -> Mapping[str, str]:
     for name in numbers:
         if name in attributes and not re.fullmatch(r"-?[0-9]{1,7}(?:\.[0-9]{1,12})?", attributes[name]):
             raise value.error(f"a plain decimal number as {name}", attributes[name])
+    if kind == "pointRx" and not re.fullmatch(rf"{PART}\[[0-9]{{1,3}}\]", attributes["fatherId"]):
+        raise value.error(f'fatherId="{PART}[…]"', attributes["fatherId"])
     if kind in _FATHERS and attributes["fatherId"] != _FATHERS[kind]:
         raise value.error(f'fatherId="{_FATHERS[kind]}"', attributes["fatherId"])
     if kind == "mdesc":

@@ -12,7 +12,8 @@ from cellplan.programs.elements.pages import ProgramNames
 NAME: Final = 15  # most characters of a name, that of a tool excepted
 TOOL_NAME: Final = 13
 JOINTS, TOOL, MOVE, WORLD, OUTPUT, INPUT = "jRow", "tTool", "mMove", "fWorld", "doMark", "diMark"  # names of data
-DATA: Final = rf"{JOINTS}|{TOOL}|{MOVE}|{WORLD}|{OUTPUT}|{INPUT}[0-9]*"
+PART: Final = "fPart"
+DATA: Final = rf"{JOINTS}|{TOOL}|{MOVE}|{WORLD}|{PART}|{OUTPUT}|{INPUT}[0-9]*"
 _SIGNAL: Final = rf"[A-Za-z][A-Za-z0-9_]{{0,{NAME - 1}}}"
 START, STOP = "start", "stop"  # programs that every project has
 FLANGE: Final = "flange[0]"

@@ -35,7 +35,7 @@ def read_val3(
 
 def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> tuple[RobotRows]:
     """Rows of one robot; takes the files of its project out of those that are left."""
-    player = _Val3Player(frame=frame, robot=robot, project=_project(left, path))
+    player = _Val3Player(frame=frame, robot=robot, project=read_project(left, path))
     player.play_all()
     placed = frame.robot(robot)
     q = from_numbers(placed, np.array(player.rows, dtype=np.float64).reshape(-1, 6))
@@ -51,7 +51,7 @@ class _Val3Program(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _ReadProject:
+class ReadProject:
     """What the files of a project hold."""
 
     path: str  # its folder
@@ -59,13 +59,13 @@ class _ReadProject:
     programs: Mapping[str, _Val3Program]  # its programs by name
 
 
-def _project(left: dict[str, str], path: str) -> _ReadProject:
+def read_project(left: dict[str, str], path: str) -> ReadProject:
     """Read a project; takes its files out of those that are left."""
     file = f"{path}/{path.rpartition('/')[2]}.pjx"
     listed, data_file = _listed(parse(_taken(left, file), file, "Project", PROJECT_SPACE), path)
     data = read_data(_taken(left, data_file), data_file)
     programs = {name: _program(left, f"{path}/{name}.pgx", name, data) for name in listed}
-    return _ReadProject(path=path, data=data, programs=programs)
+    return ReadProject(path=path, data=data, programs=programs)
 
 
 def _taken(left: dict[str, str], file: str) -> str:
@@ -148,7 +148,7 @@ class _Val3Player:
 
     frame: ExportFrame  # which robots
     robot: str
-    project: _ReadProject
+    project: ReadProject
     rows: list[Sequence[float]] = field(default_factory=list)  # joint positions of the controller in each row
     zones: list[float] = field(default_factory=list)  # of the tool in [mm], by row; 0 for a stop
     marks: list[int] = field(default_factory=list)  # rows with a handshake
@@ -162,6 +162,9 @@ class _Val3Player:
 
     def play_all(self) -> None:
         """Follow ``start`` and what it calls, and make sure that all that the project holds was used."""
+        for data in self.project.data.values():
+            if data.kind == "pointRx":
+                raise data.error("data of motions of the joints", data.kind)
         start, stop = (self.project.programs[name] for name in (START, STOP))
         for node in stop.code:
             if _statement(node).kind != "RESET":
@@ -198,6 +201,8 @@ class _Val3Player:
                 self._stand(statement)
             elif statement.kind == "CALL":
                 self._call(program, statement)
+            elif statement.kind in {"LINE", "ARC", "DELAY"}:
+                raise statement.error("motions of the joints, and signals")
             elif statement.kind == "RESET":
                 raise statement.error("resetMotion() in stop alone")
             else:

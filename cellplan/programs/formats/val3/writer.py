@@ -1,22 +1,21 @@
 """VAL3 of Staubli: a project for each robot, whose data hold the rows and whose programs move from one to the next."""
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from html import escape
 from typing import Final, NamedTuple
 
 from cellplan.errors import raise_findings, refusals
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ExportFrame, ExportJob, Promise
+from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, ProgramRows, Promise
 from cellplan.model.units import MM
 from cellplan.programs.elements.conventions import CONVENTIONS
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.frames import on_flange
 from cellplan.programs.elements.handshake import HandshakeStep
 from cellplan.programs.elements.joints import from_numbers
-from cellplan.programs.elements.pages import PagedProgram, program_paths, render_programs, require_six_axes
-from cellplan.programs.elements.text import comment, fixed, joined
+from cellplan.programs.elements.paced import moves_of
+from cellplan.programs.elements.pages import PagedProgram, paged, program_paths, render_programs, require_six_axes
+from cellplan.programs.elements.text import comment, fixed
 from cellplan.programs.formats.val3.names import (
     BASE,
     FLANGE,
@@ -31,17 +30,17 @@ from cellplan.programs.formats.val3.names import (
     require_links,
     signal_names,
 )
+from cellplan.programs.formats.val3.project_text import array_lines, data_text, index_text, program_text
 from cellplan.programs.formats.val3.reader import read_val3
-from cellplan.programs.formats.val3.xml import DATA_SPACE, PROGRAM_SPACE, PROJECT_SPACE, TYPE_SPACE
+from cellplan.programs.formats.val3.seams import SeamWriter, require_seams, routine_names, val3_events
+from cellplan.programs.formats.val3.seams_reader import read_val3_seams
 from cellplan.programs.formats.zones import on_scale, tool_zones
 
 DECIMALS: Final = 5
 POSE_DECIMALS: Final = 3
 PAGE: Final = 1000  # rows
 ZONES: Final = tuple(round(10.0 ** (1.7 + place / 10.0)) for place in range(37))  # [um] of a row, 0.05 to 200 mm
-VERSION: Final = "s7.10.2"  # of the language, as public projects state it
 NO_LIMIT: Final = "99999"  # [mm/s] and [deg/s] of the tool: the axes are what limits
-XML: Final = '<?xml version="1.0" encoding="utf-8"?>'
 
 
 class _Move(NamedTuple):
@@ -59,7 +58,12 @@ def render_val3(job: ExportJob) -> dict[str, str]:
     """
     paths = program_paths(job.frame, VAL3, PROJECTS)
     raise_findings(refusals(*_demands(job.frame, 0)))
-    return render_programs(job, VAL3, paths, _files)
+    if job.frame.promise is not Promise.PACED:
+        return render_programs(job, VAL3, paths, _files)
+    files: dict[str, str] = {}
+    for (name, robot), path in paths.items():
+        files |= _with_seams(job, next(it for it in job.programs if it.name == name), robot, path)
+    return files
 
 
 def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
@@ -67,6 +71,25 @@ def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
     for robot in frame.robots:
         yield partial(require_links, frame, robot)
         yield partial(require_six_axes, frame.robot(robot), external=0, what="VAL3")
+        if frame.promise is Promise.PACED:
+            yield partial(require_seams, frame, robot)
+
+
+def _with_seams(job: ExportJob, program: ProgramRows, robot: str, path: str) -> dict[str, str]:
+    """All files of a project with seams."""
+    project = paged(job, VAL3, program, robot, path)
+    names = routine_names(job.frame, robot, project.name)
+    seams = SeamWriter(
+        frame=job.frame, project=project, moves=moves_of(job, program, val3_events(job.frame, robot)), names=names
+    )
+    heads = [line for note in project.notes for line in comment(note, "//", forbidden="]")]
+    programs = {name: program_text(name, code) for name, code in seams.programs().items() if name != START}
+    programs[STOP] = program_text(STOP, ["resetMotion()"])
+    programs[START] = program_text(START, [*heads, *seams.programs()[START]])
+    texts = {f"{name}.pgx": text for name, text in sorted(programs.items())}
+    data = data_text(project.notes, seams.arrays())
+    texts = {f"{project.name}.pjx": index_text(project, texts), f"{project.name}.dtx": data, **texts}
+    return {f"{path}/{file}": text for file, text in texts.items()}
 
 
 def _files(project: PagedProgram) -> dict[str, str]:
@@ -77,7 +100,7 @@ def _files(project: PagedProgram) -> dict[str, str]:
     places = {move: place for place, move in enumerate(dict.fromkeys(motions))}  # of the motion descriptors
     signals = signal_names(project.steps)
     pages = [f"{project.name}{ending}" for ending in project.endings]
-    programs = {STOP: _program(STOP, ["resetMotion()"])}
+    programs = {STOP: program_text(STOP, ["resetMotion()"])}
     handshake = [_instruction(step, signals) for step in project.steps]
     moves = [
         _moves(project, page, ending, descriptors=[places[motions[row]] for row in page], handshake=handshake)
@@ -87,63 +110,26 @@ def _files(project: PagedProgram) -> dict[str, str]:
         code = moves[0]
     else:
         code = [f"call {page}()" for page in pages]
-        programs |= {page: _program(page, page_moves) for page, page_moves in zip(pages, moves, strict=True)}
+        programs |= {page: program_text(page, page_moves) for page, page_moves in zip(pages, moves, strict=True)}
     heads = [line for note in project.notes for line in comment(note, "//", forbidden="]")]
     first = [_instruction(step, signals) for step in project.first]
-    programs[START] = _program(START, [*heads, *first, *code, "waitEndMove()"])
+    programs[START] = program_text(START, [*heads, *first, *code, "waitEndMove()"])
     files = {f"{program}.pgx": text for program, text in sorted(programs.items())}
     data = _data(project, places, signals)
-    files = {f"{project.name}.pjx": _index(project, files), f"{project.name}.dtx": data, **files}
+    files = {f"{project.name}.pjx": index_text(project, files), f"{project.name}.dtx": data, **files}
     return {f"{project.path}/{file}": text for file, text in files.items()}
-
-
-def _index(project: PagedProgram, programs: Iterable[str]) -> str:
-    """The file that lists programs and data."""
-    return joined(
-        [
-            XML,
-            f'<Project xmlns="{PROJECT_SPACE}">',
-            *_xml_comments(project.notes),
-            f'  <Parameters version="{VERSION}" stackSize="5000" millimeterUnit="true"/>',
-            "  <Programs>",
-            *(f'    <Program file="{program}"/>' for program in programs),
-            "  </Programs>",
-            "  <Database>",
-            f'    <Data file="{project.name}.dtx"/>',
-            "  </Database>",
-            "  <Libraries/>",
-            "  <Types/>",
-            "</Project>",
-        ]
-    )
 
 
 def _data(project: PagedProgram, descriptors: Iterable[_Move], signals: Mapping[tuple[bool, str], str]) -> str:
     """The data: signals, rows, motion descriptors, tool and world frame."""
-    lines = [
-        XML,
-        f'<Database xmlns:xsi="{TYPE_SPACE}" xmlns="{DATA_SPACE}">',
-        *_xml_comments(project.notes),
-        "  <Datas>",
-    ]
-    lines += _array(WORLD, "frame", [{"fatherId": BASE}])
+    lines = array_lines(WORLD, "frame", [{"fatherId": BASE}])
     for (is_input, signal), name in signals.items():
-        lines += _array(name, "dio", [{"link": link(signal, is_input=is_input)}])
+        lines += array_lines(name, "dio", [{"link": link(signal, is_input=is_input)}])
     for page, ending in zip(project.pages, project.endings, strict=True):
-        lines += _array(f"{JOINTS}{ending}", "jointRx", [_joints(project, row) for row in page])
-    lines += _array(MOVE, "mdesc", [_descriptor(move) for move in descriptors])
-    lines += _array(TOOL, "tool", [_tool(project.placed)])
-    return joined([*lines, "  </Datas>", "</Database>"])
-
-
-def _array(name: str, kind: str, values: Sequence[Mapping[str, str]]) -> list[str]:
-    """One array of data, its size that of its values."""
-    rows = [
-        f'      <Value key="{key}" {" ".join(f"{item}={_quoted(text)}" for item, text in value.items())}/>'
-        for key, value in enumerate(values)
-    ]
-    head = f'    <Data name="{name}" access="public" xsi:type="array" type="{kind}" size="{len(values)}">'
-    return [head, *rows, "    </Data>"]
+        lines += array_lines(f"{JOINTS}{ending}", "jointRx", [_joints(project, row) for row in page])
+    lines += array_lines(MOVE, "mdesc", [_descriptor(move) for move in descriptors])
+    lines += array_lines(TOOL, "tool", [_tool(project.placed)])
+    return data_text(project.notes, lines)
 
 
 def _joints(project: PagedProgram, row: int) -> dict[str, str]:
@@ -185,40 +171,20 @@ def _instruction(step: HandshakeStep, signals: Mapping[tuple[bool, str], str]) -
     return f"wait({name}=={state})" if step.waits else f"{name}={state}"
 
 
-def _program(name: str, code: Sequence[str]) -> str:
-    """A program."""
-    return joined(
-        [
-            XML,
-            f'<Programs xmlns:xsi="{TYPE_SPACE}" xmlns="{PROGRAM_SPACE}">',
-            f'  <Program name="{name}" access="public">',
-            "    <Code><![CDATA[begin",
-            *(f"  {line}" for line in code),
-            "end]]></Code>",
-            "  </Program>",
-            "</Programs>",
-        ]
-    )
-
-
-def _xml_comments(notes: Iterable[str]) -> list[str]:
-    """Comments of the notes, which two hyphens would end."""
-    apart = (re.sub(r"-(?=-)", "- ", note) for note in notes)
-    return [f"  <!--{line} -->" for note in apart for line in comment(note, "")]
-
-
-def _quoted(text: str) -> str:
-    """Text as the value of an attribute."""
-    return '"' + escape(text, quote=False).replace('"', "&quot;") + '"'
+def _read(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
+    """What the files say, by the reader of lines and arcs where there may be some."""
+    read = read_val3_seams if frame.promise is Promise.PACED else read_val3
+    return read(frame, files, program_paths(frame, VAL3, PROJECTS))
 
 
 VAL3: Final[Dialect] = Dialect(
     name="val3",
     title="Staubli VAL3: a project of .pjx, .dtx and .pgx files for each robot",
     render=render_val3,
-    read=lambda frame, files: read_val3(frame, files, program_paths(frame, VAL3, PROJECTS)),
+    read=_read,
     decimals=DECIMALS,
-    promises=(Promise.SEQUENCE_ONLY,),
+    promises=(Promise.PACED, Promise.SEQUENCE_ONLY),
+    moves=(Moves.JOINTS, Moves.LINEAR),
     kinds=frozenset({"staubli"}),
     is_thinned=True,
     is_rounded=True,
