@@ -20,7 +20,7 @@ The public interface; everything else may change without notice:
 - show: ``tables``, ``to_frame``, ``to_html``: results as pandas frames, and in a notebook
 - inputs: ``Cell``, ``AssignmentDraft``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``,
   ``Axis``, ``BaseGrid``, ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``, ``ViewRequest``,
-  ``FloorPlanRequest``, ``Choice``
+  ``FloorPlanRequest``, ``Choice``, ``Moves``
 - results: ``Solution``, ``Assignment``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``,
   ``Screening``, ``LayoutResult``, ``Recovery``, ``Repair``, ``VerifiedRun``, ``Exported``
 - errors: ``CellplanError``
@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from cellplan.jobs.view.write import ViewRequest, view, write_view
     from cellplan.model.cell.cell import Cell, Part, Robot
     from cellplan.model.motion.motion import Motion, Program
+    from cellplan.model.report.exported import Moves
     from cellplan.model.report.report import Check, Report
     from cellplan.model.report.verified_run import VerifiedRun
     from cellplan.model.task.task import Task
@@ -98,6 +99,7 @@ _HOME: Final = {
     "CellplanError": "errors",
     "Check": "model.report.report",
     "Choice": "programs.export.choice",
+    "Moves": "model.report.exported",
     "CompareJob": "jobs.compare.compare",
     "Exported": "programs.export.several",
     "FloorPlanRequest": "jobs.floor_plan_file",
@@ -171,6 +173,7 @@ __all__ = [
     "LayoutResult",
     "MapRequest",
     "Motion",
+    "Moves",
     "Part",
     "Program",
     "Recovery",

@@ -11,9 +11,11 @@ from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import AnyRun
 from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.model.task.task import Service
+from cellplan.model.units import MM
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.joints import Axes
+from cellplan.programs.elements.process import ProcessForm
 from cellplan.programs.promises.run_programs import moving_robots, run_programs, spoilt_by_another_order
 from cellplan.programs.promises.skew import PER_SECOND, ClockPair, RunSkew, skew_text
 
@@ -216,6 +218,7 @@ def _remarks(export: _Export, promise: Promise) -> Iterator[str]:
         case Promise.PACED:
             yield "on seams the tool moves at the programmed speed; times between robots are not kept"
             yield "accelerations are those of the controllers and are not judged"
+            yield from _processes(export)
             yield from _unwritten(cell)
             yield from _stays(export)
         case Promise.SEQUENCE_ONLY:
@@ -236,6 +239,23 @@ def _unwritten(cell: Cell) -> Iterator[str]:
     names = [robot.name for robot in cell.robots if not waits(cell, robot.name)]
     if names and len(cell.robots) > 1:
         yield f"no format writes the waits of {listed(names)}: program the marks of export.json there by hand"
+
+
+def _processes(export: _Export) -> Iterator[str]:
+    """Where a controller takes the speed of the tool from data of its own, and where no process is written."""
+    for robot in export.robots:
+        control = export.run.cell.robot(robot).control
+        tasks = [task for task in export.run.cell.tasks if task.robot == robot and task.process is not None]
+        if control is None or not tasks:
+            continue
+        form = ProcessForm.of(export.run.cell.controllers[control.id])
+        if form is None:
+            yield f"no statement of a process is written for '{robot}': state controllers.{control.id}.process"
+            continue
+        held = dict.fromkeys((form.feed_in(task.name), task.feed) for task in tasks)
+        for data, feed in held:
+            if data is not None and feed is not None:
+                yield f"the tool of '{robot}' moves at {MM * feed:g} mm/s if {data} holds it"
 
 
 def _stays(export: _Export) -> Iterator[str]:

@@ -1,6 +1,7 @@
 """Paced programs of a solved cell: what is written is read by other means, and what is changed is noticed."""
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,70 +25,23 @@ from cellplan.programs.rows.rows import full_rows
 from cellplan.programs.seams.executed import executed_programs
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
-CELL = """\
-cellplan: 1
-name: ring-and-corner
-robots:
-  arm:
-    model: abb_irb1600_8_145
-    tool: {mass_kg: 3, rod: {length_mm: 300, tilt_deg: 35, radius_mm: 10, stick_out_mm: 15}}
-    home_deg: [0, -20, 20, 0, 60, 0]
-    controller: {id: irc5, tool_frame: {rpy_deg: [0, 0, 180]}, base: {xyz_mm: [0, 0, 100], rpy_deg: [0, 0, 90]}}
-controllers:
-  irc5:
-    kind: abb
-    process:
-      on: "DispLStart {point},{speed},{data},{zone},{tool}\\\\WObj:={frame};"
-      inner: "DispL {point},{speed},{data},{zone},{tool}\\\\WObj:={frame};"
-      off: "DispLEnd {point},{speed},{data},{zone},{tool}\\\\WObj:={frame};"
-      data: {ring: bead1, corner: bead2}
-part:
-  geometry: {box: {size_mm: [500, 400, 60]}}
-  at: {xyz_mm: [1000, 0, 300]}
-tasks:
-  ring:
-    robot: arm
-    path: {circle: {plane: xy, radius_mm: 80}, offset_mm: 30}
-    tool_axis: [0, 0, -1]
-    free: [spin]
-    approach_mm: 60
-    approach_s: 1
-    retract_mm: 60
-    retract_s: 1
-    process: {feed_mm_s: 40, on_delay_s: 0.3, off_delay_s: 0.2}
-  corner:
-    robot: arm
-    path: {polyline: {points_mm: [[-200, -150, 30], [200, -150, 30], [200, 150, 30]]}}
-    tool_axis: [0, 0, -1]
-    free: [spin]
-    approach_mm: 60
-    approach_s: 1
-    retract_mm: 60
-    retract_s: 1
-    tolerance: {position_mm: 0.5}
-    process: {feed_mm_s: 40, on_delay_s: 0.3, off_delay_s: 0.2}
-program: {}
-motion: {mode: part_at_rest, step_s: 0.004}
-checks: {clearance_mm: 5}
-"""
+BEAD = Path(__file__).resolve().parents[3] / "examples" / "seams" / "bead.yaml"
 NUMBERS = r"\[([^\[\]]*)\]"
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> VerifiedRun:
     folder = tmp_path_factory.mktemp("paced")
-    (folder / "cell.yaml").write_text(CELL, encoding="utf-8")
+    shutil.copy(BEAD, folder / "cell.yaml")
     status, _, error = run_command("cellplan solve cell.yaml -o run --quiet", folder)
     assert (status, error) == (0, "")
     return open_gate(Path(folder / "run"), cell=Path(folder / "cell.yaml"))
 
 
 @pytest.fixture(scope="module")
-def frame(tmp_path_factory: pytest.TempPathFactory) -> ExportFrame:
+def frame() -> ExportFrame:
     """What a reader knows of a paced export of the cell, which is not solved."""
-    path = tmp_path_factory.mktemp("frame") / "cell.yaml"
-    path.write_text(CELL, encoding="utf-8")
-    cell = load_cell(path)
+    cell = load_cell(BEAD)
     X = inverse(controller_base(cell.robot("arm"))) @ cell.part.X_CP
     station = Station(tasks=("ring", "corner"), X=X, X_W=cell.part.X_CP)
     return ExportFrame(
