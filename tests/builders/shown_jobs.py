@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from builders.export_jobs import cell_of, controlled, job_of, positioner_model
-from builders.fanuc_jobs import CONTROLLER, FANUC, counted
+from builders.fanuc_jobs import CONTROLLER, FANUC, counted, seam_job
 from builders.rapid_jobs import multimove_cell
 from builders.scene_builders import arm_model
 from builders.stream_jobs import with_latency
@@ -85,6 +85,11 @@ def motion_groups() -> ExportJob:
     program = ProgramRows(name=None, robots=rows)
     job = job_of(cell_of(weld, table, kind=FANUC), program, promise=Promise.SYNCHRONISED, blend=0.5)
     return counted(job, _to_the_ground())
+
+
+def welded_seam() -> ExportJob:
+    """A FANUC arm that welds a line, an arc and a line."""
+    return seam_job(process={"on": ("Weave Sine[1]", "Weld Start[1,1]"), "off": ("Weld End[1,1]", "Weave End")})
 
 
 def timed_table(kind: KindName = "other") -> ExportJob:

@@ -26,6 +26,7 @@ MOST_SPIN: Final = np.deg2rad(3.0)  # [rad] by which a tool may leave its orient
 ROUNDING_SHARE: Final = 0.25  # [-] of the tolerance that a corner in process may be cut by
 THIN_TURN: Final = np.deg2rad(0.05)  # [rad] that a turning joint may be off the path of a transfer
 THIN_SLIDE: Final = 5e-5  # [m] that a sliding joint may, likewise
+SHARE_STEP: Final = 1e-5  # [-] to which the share of a corner is found
 MOST_TURN: Final = np.deg2rad(0.02)  # [rad] that a corner may be cut by
 SLOWEST: Final = 1e-4  # [m/s] a tool that is slower turns rather than moves
 TURNS: Final = np.deg2rad(0.1)  # [rad] a tool that stands and turns by less moves on no line
@@ -287,15 +288,21 @@ def _feed(path: ToolPath, rows: RobotRows, between: tuple[int, int, int]) -> flo
 
 
 def _cuts(path: ToolPath, pieces: Sequence[Piece]) -> Iterator[float]:
-    """Share of the shorter neighbouring piece within which each inner row may be rounded.
+    """Share of the shorter neighbouring piece within which each inner row may be rounded, by bisection.
 
-    A small corner is cut by as much less as its ends are nearer to it.
+    A corner of two lines is cut by as much less as its ends are nearer to it, one of arcs that meet smoothly by the
+    square of that.
     """
     allowed = ROUNDING_SHARE * path.task.tolerance.between[0]
     for one, other in pairwise(pieces):
         shorter = min(one.shape.length, other.shape.length)
-        if shorter < STANDS:
-            yield 0.0
-            continue
-        cut, turn = corner_cut(one.shape, other.shape, LARGEST_SHARE * shorter)
-        yield LARGEST_SHARE / max(cut / allowed, float(np.linalg.norm(turn)) / MOST_TURN, 1.0)
+        low, high = 0.0, LARGEST_SHARE if shorter >= STANDS else 0.0
+        share = high
+        while high - low > SHARE_STEP:
+            cut, turn = corner_cut(one.shape, other.shape, share * shorter)
+            is_within = cut <= allowed and float(np.linalg.norm(turn)) <= MOST_TURN
+            low, high = (share, high) if is_within else (low, share)
+            if low == LARGEST_SHARE:
+                break
+            share = 0.5 * (low + high)
+        yield low

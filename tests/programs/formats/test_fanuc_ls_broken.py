@@ -97,12 +97,12 @@ ONE = {
     "call": (re.compile(r"(?<=  28:)[^;]*"), "  CALL GRIPPER ", "  28:"),
     "call of a page": (re.compile(r"(?<=  28:)[^;]*"), "  CALL ALPHA_001 ", "  28:"),
     "pulse": ("DO[10]=ON", "DO[10]=PULSE,0.1sec", "  14:"),
-    "other output": ("DO[10]=ON", "DO[11]=ON", "  14:"),
-    "other state": ("DO[10]=ON", "DO[10]=OFF", "  14:"),
+    "other output": ("DO[10]=ON", "DO[11]=ON", "  13:"),
+    "other state": ("DO[10]=ON", "DO[10]=OFF", "  13:"),
     "other input": ("WAIT DI[101]=ON", "WAIT DI[102]=ON", "  13:"),
-    "handshake without its wait": (re.compile(r"  15:  WAIT[^\n]*\n"), "", "  16:"),
-    "handshake without its end": (re.compile(r"  16:  DO[^\n]*\n"), "", "  17:"),
-    "output not lowered": (re.compile(r"  11:  DO[^\n]*\n"), "", "  13:"),
+    "handshake without its wait": (re.compile(r"  15:  WAIT[^\n]*\n"), "", "  13:"),
+    "handshake without its end": (re.compile(r"  16:  DO[^\n]*\n"), "", "  13:"),
+    "output not lowered": (re.compile(r"  11:  DO[^\n]*\n"), "", "  12:"),
     "output raised at the start": ("DO[10]=OFF", "DO[10]=ON", "  11:"),
     "no handshake": (
         re.compile(r"(?s)  13:  WAIT.*?DO\[10\]=OFF ;\r\n(.*?)  2\d:  WAIT.*?DO\[10\]=OFF ;\r\n"),
@@ -162,7 +162,7 @@ PAGES = {
         "ALPHA_002.ls",
         "/END",
     ),
-    "handshake cut off": ("ALPHA_001.ls", re.compile(r"[^\n]*DO\[10\]=OFF ;\r\n/POS"), "/POS", "ALPHA_001.ls", "/END"),
+    "handshake cut off": ("ALPHA_001.ls", re.compile(r"[^\n]*DO\[10\]=OFF ;\r\n/POS"), "/POS", "ALPHA_001.ls", "  21:"),
 }
 
 
@@ -218,9 +218,11 @@ def test_robots_that_do_not_meet_equally_often_are_refused() -> None:
 
 def test_signals_of_a_cell_with_one_robot_are_refused() -> None:
     job = one_arm("fanuc")
-    text = re.sub(r"(?<=\d:)J P\[9\][^;]*", "  DO[1]=ON ", FANUC_LS.render(job)["ALPHA.ls"])
+    text = FANUC_LS.render(job)["ALPHA.ls"].replace("/POS", "  99:  DO[1]=ON ;\r\n/POS")
 
-    assert "signals only once behind FINE at a mark" in message(job, {"ALPHA.ls": text})
+    assert message(job, {"ALPHA.ls": text}).startswith(
+        f"ALPHA.ls:{line_of(text, '  99:', 1)}: expected after this move"
+    )
 
 
 def test_a_file_that_was_cut_off_anywhere_is_refused() -> None:

@@ -17,6 +17,7 @@ from builders.shown_jobs import (
     timed_table,
     waiting_arms,
     waiting_fanucs,
+    welded_seam,
 )
 
 from cellplan.model.report.exported import ExportJob
@@ -27,7 +28,11 @@ SHOWN = re.compile(r"^`(?P<path>[\w./]+)`[^\n]*:\n\n<!-- not run -->\n```\w+\n(?
 
 Shown = Sequence[tuple[ExportJob, Sequence[str]]]
 PAGES: dict[str, Shown] = {
-    "fanuc_ls": [(motion_groups(), ["R30.ls"]), (waiting_fanucs(), ["WELD.ls"])],
+    "fanuc_ls": [
+        (motion_groups(), ["R30.ls"]),
+        (waiting_fanucs(), ["WELD.ls"]),
+        (welded_seam(), ["ALPHA_WORK_OF_ALPHA.ls"]),
+    ],
     "json": [(timed_table(), ["program.json"])],
     "krl": [
         (waiting_arms("kuka", NUMBERS), ["weld.src", "weld.dat"]),

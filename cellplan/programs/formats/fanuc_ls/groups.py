@@ -1,10 +1,12 @@
 """Motion groups of FANUC controllers: which robot is which one, in which program, with which axes and frames."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Final, NamedTuple
+
+import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.model.cell.cell import Robot
@@ -13,6 +15,7 @@ from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.handshake import signals_by_key
 from cellplan.programs.elements.joints import Axes, require_counted
 from cellplan.programs.elements.pages import ProgramNames, page_names, robots_of
+from cellplan.programs.formats.fanuc_ls.poses import configuration
 
 KIND: Final = "fanuc"
 EXTERNAL: Final = 3  # extended axes E1 to E3 of a group
@@ -44,6 +47,12 @@ class MotionGroup:
         names = [f"J{place + 1}" if place < count else f"E{place + 1 - count}" for place in range(len(joints))]
         return {name: joints[place].display_unit.name for name, place in zip(names, self.order, strict=True)}
 
+    @property
+    def pose_axes(self) -> dict[str, str]:
+        """The same of a pose of its tool: place and turns, then E1 and on."""
+        external = {name: unit for name, unit in self.axes.items() if name.startswith("E")}
+        return {**dict.fromkeys("XYZ", "mm"), **dict.fromkeys("WPR", "deg"), **external}
+
 
 class TpProgram(NamedTuple):
     """A program of a controller."""
@@ -51,6 +60,7 @@ class TpProgram(NamedTuple):
     program: str | None  # which of the programs that are exported
     name: str  # its name, that of its file without the ending
     groups: tuple[MotionGroup, ...]  # that it moves, by rising number
+    seams: Mapping[str, str]  # names of the programs of its seams, by task
 
 
 def tp_programs(frame: ExportFrame, dialect: Dialect) -> list[TpProgram]:
@@ -73,8 +83,24 @@ def tp_programs(frame: ExportFrame, dialect: Dialect) -> list[TpProgram]:
         for program in frame.programs
         for unit in units
     }
-    names = page_names(labels.values(), NAMES)
-    return [TpProgram(program, names[label].upper(), units[unit]) for (program, unit), label in labels.items()]
+    seams = {
+        (label, task): f"{label}\0\0{task}"
+        for (_, unit), label in labels.items()
+        for station in frame.stations.get(unit, ())
+        for task in station.tasks
+    }
+    names = {label: name.upper() for label, name in page_names([*labels.values(), *seams.values()], NAMES).items()}
+    return [
+        TpProgram(
+            program, names[label], units[unit], {task: names[word] for (of, task), word in seams.items() if of == label}
+        )
+        for (program, unit), label in labels.items()
+    ]
+
+
+def seam_name(program: TpProgram, task: str, number: int) -> str:
+    """Name of the program of a seam, which is passed for the first or a further time."""
+    return program.seams[task] if number == 1 else f"{program.seams[task]}_{number}"
 
 
 def motion_group(frame: ExportFrame, name: str) -> MotionGroup:
@@ -105,6 +131,24 @@ def demands(frame: ExportFrame, _rows: int = 0) -> Iterator[Callable[[], object]
         yield partial(_require_frames, frame, name)
         yield partial(_require_signals, frame, name)
         yield partial(_require_axes, robot)
+        if frame.promise is Promise.PACED and any(task.robot == name for task in frame.cell.tasks):
+            yield partial(_require_stations, frame, name)
+            yield partial(configuration, robot, np.zeros((1, len(robot.model.joints))))
+
+
+def _require_stations(frame: ExportFrame, robot: str) -> None:
+    """Refuse linear moves without the numbers of their frames, and on a part that another group holds."""
+    control, key = frame.robot(robot).control, f"robots.{robot}.controller"
+    if control is None or not (control.frames or control.base_number):
+        raise InputError(f"{key}.frames: expected the numbers of the frames of the part, 1 to {FRAMES[1]}, got none")
+    if control.tool_number is None:
+        raise InputError(f"{key}.tool_number: expected the number of its tool frame, from which it moves, got none")
+    for station in frame.stations.get(robot, ()):
+        if station.holder is not None:
+            raise InputError(
+                f"--moves linear: expected a part that no group of '{control.id}' holds, got '{station.holder}': "
+                "fanuc_ls moves tools by joints there"
+            )
 
 
 def _require_axes(robot: Robot) -> None:

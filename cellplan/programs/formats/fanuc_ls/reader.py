@@ -1,38 +1,41 @@
 """Strict reader of TP programs: the written subset and harmless variants of it, nothing else."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Final, NoReturn
 
 import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.model.report.exported import ExportFrame, ProgramRows, Promise, RobotRows
+from cellplan.model.units import MM
+from cellplan.programs.elements.conventions import CONVENTIONS
 from cellplan.programs.elements.corners import LARGEST_SHARE
-from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step
-from cellplan.programs.elements.joints import from_numbers
-from cellplan.programs.elements.text import Statement
-from cellplan.programs.formats.fanuc_ls.groups import TpProgram
-from cellplan.programs.formats.fanuc_ls.text import TpFile, TpPoint, read_file
+from cellplan.programs.elements.joints import Axes, from_numbers
+from cellplan.programs.elements.paced import Events, ReadMove, Which, rows_of_moves, shorter_lengths
+from cellplan.programs.formats.fanuc_ls.groups import KIND, MotionGroup, TpProgram
+from cellplan.programs.formats.fanuc_ls.player import MILLISECONDS, TpMotion, TpPlayer
+from cellplan.programs.formats.fanuc_ls.poses import read_configuration
+from cellplan.programs.formats.fanuc_ls.seams import WELD_SPEED, speed_is_held, tp_events
 
-MOST_MS: Final = 32_000  # [ms] of a motion; known from practice
-MILLISECONDS: Final = {"msec": 1.0, "sec": 1000.0}
+ARM: Final = 6  # numbers of a pose, as many as of the joints of an arm
 
 
 def read_fanuc_ls(
     frame: ExportFrame, files: Mapping[str, str], programs: Sequence[TpProgram]
 ) -> tuple[ProgramRows, ...]:
-    """Read the files of an export back, strictly: positions, marks, and times of groups that move in step.
+    """Read the files of an export back, strictly: positions, marks, seams, and times of groups that move in step.
 
     An ``InputError`` has file and line.
     """
     left = dict(files)
     rows: dict[str | None, dict[str, RobotRows]] = {name: {} for name in frame.programs}
     for program in programs:
-        player = _TpPlayer(frame=frame, program=program)
+        player = TpPlayer(frame=frame, program=program)
         player.play_all(left)
-        rows[program.program] |= {group.robot.name: player.rows(place) for place, group in enumerate(program.groups)}
+        read = _in_step if player.in_step else _waiting
+        rows[program.program] |= {group.robot.name: read(player, group) for group in program.groups}
         if len({len(one.marks) for one in rows[program.program].values()}) > 1:
             raise InputError(f"{program.name}.ls: expected as many marks as the programs of the other robots have")
     if left:
@@ -43,169 +46,96 @@ def read_fanuc_ls(
     )
 
 
-@dataclass(slots=True, kw_only=True)
-class _TpPlayer:
-    """Follows a program statement by statement."""
+def _joints(group: MotionGroup, motion: TpMotion) -> Array:
+    """Joints of a group at the end of a motion in [rad] or [m], shape (n,); NaN for an arm whose pose is stated."""
+    values = np.array(motion.points[-1].poses[group.number].values)
+    numbers = np.empty_like(values)
+    numbers[list(group.order)] = values
+    q: Array = from_numbers(group.robot, numbers[None])[0]
+    if motion.feed is not None:
+        q[list(Axes.of(group.robot).arm)] = np.nan
+    return q
 
-    frame: ExportFrame
-    program: TpProgram
-    points: list[TpPoint] = field(default_factory=list)  # that were moved to
-    durations: list[float] = field(default_factory=list)  # of these motions in [ms]; 0 where none is stated
-    passed: list[bool] = field(default_factory=list)  # whether they end in CNT
-    marks: list[int] = field(default_factory=list)  # motions with a handshake
-    settings: set[tuple[str, int]] = field(default_factory=set)  # frames that were selected, by group
-    pages: int = 0  # that were called
-    step: int = 0  # instructions of a handshake that were met
-    lowered: Statement | None = None  # where its output was lowered before the first motion
-    unused: dict[int, TpPoint] = field(default_factory=dict)  # points of the file that are still to come
 
-    def play_all(self, left: dict[str, str]) -> None:
-        """Follow the main program and its pages; their files are taken out of those that are left."""
-        main = self._opened(left, self.program.name)
-        for statement in main.statements:
-            if statement.kind == "CALL":
-                self._call(statement, left)
-            elif self.pages:
-                raise statement.error("nothing but calls of pages behind the first one")
-            else:
-                self._play(statement)
-        self._close(main)
-        if not self.points:
-            raise main.end.error("at least one motion", "none")
-        if self.lowered and not self.marks:
-            raise self.lowered.error("a handshake at a row, as its output is lowered", "none")
+def _in_step(player: TpPlayer, group: MotionGroup) -> RobotRows:
+    """Rows of one of the groups that move in step, with their times."""
+    motions = player.motions
+    for motion in motions:
+        if motion.suffix:
+            raise motion.statement.error("no such ending of a motion here", motion.suffix)
+    return RobotRows(
+        robot=group.robot.name,
+        q=np.array([_joints(group, motion) for motion in motions]),
+        times=np.cumsum([motion.duration for motion in motions]) / MILLISECONDS["sec"],
+        rounding=np.where([motion.is_passed for motion in motions], LARGEST_SHARE, 0.0),
+    )
 
-    def rows(self, place: int) -> RobotRows:
-        """Rows of one of its groups."""
-        group = self.program.groups[place]
-        values = np.array([[*point.poses[group.number].values] for point in self.points])
-        numbers = np.empty_like(values)
-        numbers[:, group.order] = values
-        times: Array | None = None
-        if self._in_step:
-            times = np.cumsum(self.durations) / MILLISECONDS["sec"]
-        rounding = np.where(self.passed, LARGEST_SHARE, 0.0)
-        return RobotRows(
-            robot=group.robot.name,
-            q=from_numbers(group.robot, numbers),
-            times=times,
-            marks=tuple(self.marks),
-            rounding=rounding,
-        )
 
-    @property
-    def _in_step(self) -> bool:
-        return self.frame.promise is Promise.SYNCHRONISED
+def _waiting(player: TpPlayer, group: MotionGroup) -> RobotRows:
+    """Rows of a robot that waits for others, with its marks and seams."""
+    events, moves, is_on = tp_events(player.frame, group.robot.name), list[ReadMove](), False
+    for motion in player.motions:
+        move = _read_move(events, group, motion, in_process=is_on)
+        moves.append(move)
+        switches = events.read(motion.task, [statement.text for statement in motion.behind])
+        if move.process is not None:
+            is_on = move.process == "on"
+        elif switches is not None:
+            is_on = (is_on and not switches.off) or switches.on
+    moves = list(_within_halves(moves))
+    rows = rows_of_moves(events, moves, [[one.text for one in motion.behind] for motion in player.motions])
+    before, expected = [statement.text for statement in player.before], events.before(bool(rows.marks))
+    if list(map(events.plain, before)) != list(map(events.plain, expected)):
+        first = (*player.before, player.motions[0].statement)[0]
+        raise first.error(f"{expected[0] if expected else 'no handshake'} before the first motion")
+    return rows if player.frame.promise is Promise.PACED else replace(rows, process=None)
 
-    @property
-    def _handshake(self) -> tuple[HandshakeStep, ...]:
-        """What is done at a mark."""
-        return () if self._in_step else handshake_steps(self.frame, self.program.groups[0].robot.name)
 
-    def _call(self, statement: Statement, left: dict[str, str]) -> None:
-        """A page, which is played in the place of its call."""
-        expected = f"{self.program.name}_{self.pages + 1:03d}"
-        if (self.points and not self.pages) or self.unused or self.step or statement.words[0] != expected:
-            raise statement.error(f"CALL {expected} in a program without motions of its own")
-        self.pages += 1
-        page = self._opened(left, expected)
-        for inner in page.statements:
-            if inner.kind not in {"J", "OUT", "WAIT"}:
-                raise inner.error("nothing but motions and handshakes in a page")
-            self._play(inner)
-        if not page.points:
-            raise page.end.error("at least one motion", "none")
-        self._close(page)
+def _within_halves(moves: Sequence[ReadMove]) -> Iterator[ReadMove]:
+    """Moves whose corners begin no earlier than in the middle of the shorter one of both lines or arcs."""
+    places = [[pose[:3, 3] for pose in move.poses] or [np.full(3, np.nan)] for move in moves]
+    lengths = iter(shorter_lengths(np.array([p for points in places for p in points])).tolist())
+    for move, points in zip(moves, places, strict=True):
+        half = LARGEST_SHARE * [next(lengths) for _ in points][-1]
+        yield replace(move, zone=min(move.zone, half)) if half > 0.0 else move
 
-    def _opened(self, left: dict[str, str], name: str) -> TpFile:
-        """A file whose points are those of the groups."""
-        file, groups = read_file(left, name), {group.number: group for group in self.program.groups}
-        if file.groups != set(groups):
-            listed = ", ".join(map(str, groups))
-            raise file.head.error(f"DEFAULT_GROUP of motion group {listed}", ", ".join(map(str, file.groups)))
-        for point in file.points.values():
-            if set(point.poses) != set(groups):
-                raise point.statement.error(f"GP{', GP'.join(map(str, groups))}, and no other group")
-            for number, pose in point.poses.items():
-                group = groups[number]
-                if (pose.base, pose.tool) != (group.base, group.tool):
-                    raise point.statement.error(f"UF : {group.base}, UT : {group.tool} of GP{number}")
-                if list(pose.axes.items()) != list(group.axes.items()):
-                    axes = ", ".join(f"{name} in {unit}" for name, unit in group.axes.items())
-                    raise point.statement.error(f"{axes} of GP{number}, and no other axis")
-        self.unused = dict(file.points)
-        return file
 
-    def _play(self, statement: Statement) -> None:
-        """Follow one statement."""
-        if self.step and statement.kind not in {"OUT", "WAIT"}:
-            raise statement.error(f"the rest of the handshake ({self._expected()})")
-        if statement.kind == "J":
-            self._move(statement)
-        elif statement.kind in {"OUT", "WAIT"}:
-            self._signal(statement)
-        else:
-            self._select(statement)
+def _read_move(events: Events, group: MotionGroup, motion: TpMotion, *, in_process: bool) -> ReadMove:
+    """A motion as it was found; what stands behind it is refused where it stands."""
+    at = (*motion.behind, motion.statement)[0]
 
-    def _select(self, statement: Statement) -> None:
-        """A frame of a group, selected once before the first motion."""
-        number, value = int(statement.words[0] or 1), int(statement.words[1] or 0)
-        group = next((group for group in self.program.groups if group.number == number), None)
-        key = (statement.kind, number)
-        if group is None or key in self.settings or self.points:
-            raise statement.error("the frames of each group, each once before the first motion")
-        stated = group.base if statement.kind == "UFRAME" else group.tool
-        if value != stated:
-            raise statement.error(f"{statement.kind}_NUM={stated} as the cell states it")
-        self.settings.add(key)
+    def refuse(expected: str, got: str | None = None) -> NoReturn:
+        raise at.error(expected, got)
 
-    def _move(self, statement: Statement) -> None:
-        """A motion to a point of the file that was not used before."""
-        point, speed, unit, ending = (str(word) for word in statement.words)
-        if len(self.settings) < 2 * len(self.program.groups):
-            raise statement.error("UFRAME_NUM and UTOOL_NUM of each group before the first motion")
-        if int(point) not in self.unused:
-            raise statement.error("a point of this file, each once", f"P[{point}]")
-        is_timed = self._in_step and bool(self.points)
-        if (unit in MILLISECONDS) is not is_timed:
-            raise statement.error("a duration in sec or msec" if is_timed else "a speed in %", f"{speed}{unit}")
-        value = float(speed) * MILLISECONDS.get(unit, 1.0)
-        if not (0.0 < value <= MOST_MS if is_timed else value in range(1, 101)):
-            raise statement.error(f"1 to {MOST_MS} ms" if is_timed else "a whole speed of 1 to 100 %", f"{speed}{unit}")
-        if ending != "FINE" and int(ending.removeprefix("CNT")) > 100:
-            raise statement.error("FINE, or CNT0 to CNT100", ending)
-        self.points.append(self.unused.pop(int(point)))
-        self.durations.append(value if is_timed else 0.0)
-        self.passed.append(ending != "FINE")
+    poses = [point.poses[group.number] for point in motion.points] if motion.feed is not None else []
+    feed = motion.feed
+    if feed is not None and np.isnan(feed):
+        if motion.task is None or not speed_is_held(events, motion.task, in_process=in_process):
+            raise motion.statement.error("the speed of the tool in mm/sec", WELD_SPEED)
+        feed = events.frame.cell.task(motion.task).feed
+    return ReadMove(
+        refuse=refuse,
+        task=motion.task,
+        q=_joints(group, motion),
+        poses=tuple(CONVENTIONS[KIND].pose(np.array(pose.values[:ARM])) for pose in poses),
+        configurations=tuple(read_configuration(pose.configuration) for pose in poses) or None,
+        feed=np.nan if feed is None else feed,
+        zone=motion.region / MM,
+        share=LARGEST_SHARE if motion.is_passed else 0.0,
+        process=_process(events, motion, in_process=in_process),
+    )
 
-    def _signal(self, statement: Statement) -> None:
-        """An instruction of a handshake."""
-        expected, row = self._handshake, len(self.points) - 1
-        step = HandshakeStep(statement.kind == "WAIT", str(int(statement.words[0] or 0)), statement.words[1] == "ON")
-        if expected and not self.lowered:
-            first = lowering_step(self.frame, self.program.groups[0].robot.name)
-            if row >= 0 or self.pages or step != first:
-                raise statement.error(f"DO[{first.signal}]=OFF before the first motion")
-            self.lowered = statement
-            return
-        if not expected or row < 0 or self.passed[row] or row in self.marks:
-            raise statement.error("signals only once behind FINE at a mark")
-        if step != expected[self.step]:
-            raise statement.error(f"the handshake of the cell ({self._expected()})")
-        self.step = (self.step + 1) % len(expected)
-        if self.step == 0:
-            self.marks.append(row)
 
-    def _expected(self) -> str:
-        """The next instruction of a handshake."""
-        step = self._handshake[self.step]
-        return f"{'WAIT DI' if step.waits else 'DO'}[{step.signal}]={'ON' if step.is_on else 'OFF'}"
-
-    def _close(self, file: TpFile) -> None:
-        """Make sure that a file ends in order."""
-        if self.step:
-            raise file.end.error(f"the rest of the handshake ({self._expected()})")
-        for number, point in self.unused.items():
-            raise point.statement.error("points that are used", f"P[{number}]")
-        if self.passed and self.passed[-1]:
-            raise file.end.error("FINE at the last row", "CNT")
+def _process(events: Events, motion: TpMotion, *, in_process: bool) -> Which | None:
+    """Whether the suffix of a motion begins or ends the process; lines that belong to it stand behind the motion."""
+    form, task = (None, "") if motion.task is None else (events.form, motion.task)
+    if motion.suffix and (form is None or form.suffix(not in_process, task) != motion.suffix):
+        raise motion.statement.error("no such ending of a motion here", motion.suffix)
+    switches = events.read(motion.task, [statement.text for statement in motion.behind])
+    if form is not None and switches is not None:
+        for is_on, has_lines in ((True, switches.on), (False, switches.off)):
+            is_stated = bool(motion.suffix) and is_on is not in_process
+            if form.suffix(is_on, task) and form.lines(is_on, task) and has_lines is not is_stated:
+                expected = " and ".join([form.suffix(is_on, task), *form.lines(is_on, task)])
+                raise motion.statement.error(f"{expected} together, or none")
+    return ("off" if in_process else "on") if motion.suffix else None

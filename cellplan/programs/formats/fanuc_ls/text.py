@@ -1,7 +1,7 @@
 """Files of TP programs: sections, attributes, numbered lines and points; anything else refused with file and line."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise, zip_longest
 from typing import Final, NamedTuple
 
@@ -29,22 +29,31 @@ _ATTRIBUTES: Final = {
 _ATTRIBUTE: Final = re.compile(r"(?:TCD:\s*)?([A-Z_]+)\s*=\s*(.*?)\s*([,;])")
 _LINE: Final = re.compile(r"([0-9]{1,6})\s*:\s*(.*?)\s*;")
 _NUMBER: Final = r"-?(?:[0-9]{1,7}(?:\.[0-9]{0,12})?|\.[0-9]{1,12})"
-_AXIS: Final = re.compile(rf"([JE][1-9])\s*=\s*({_NUMBER})\s*(deg|mm)")
-_AXES: Final = rf"[JE][1-9]\s*=\s*{_NUMBER}\s*(?:deg|mm)"
+_NAME: Final = r"(?:[JE][1-9]|[XYZWPR])"
+_AXIS: Final = re.compile(rf"({_NAME})\s*=\s*({_NUMBER})\s*(deg|mm)")
+_AXES: Final = rf"{_NAME}\s*=\s*{_NUMBER}\s*(?:deg|mm)"
+_CONFIG: Final = r"CONFIG\s*:\s*'([NF] [UD] [TB](?:,\s*-?[0-9]){3})'\s*,"
 _GROUP: Final = re.compile(
     rf"GP([1-8])\s*:\s*UF\s*:\s*([0-9]{{1,3}})\s*,\s*UT\s*:\s*([0-9]{{1,3}})\s*,"
-    rf"\s*({_AXES}(?:\s*,\s*{_AXES})*)\s*"
+    rf"\s*(?:{_CONFIG})?\s*({_AXES}(?:\s*,\s*{_AXES})*)\s*"
 )
 _POINT: Final = re.compile(r"P\s*\[\s*([0-9]{1,5})\s*\]\s*\{\s*(.*?)\s*\}\s*;")
+_P: Final = r"P\s*\[\s*([0-9]{1,5})\s*\]\s+"
+_FEED: Final = r"(?:([0-9]{1,4}(?:\.[0-9])?)\s*mm/sec|WELD_SPEED)\s+(FINE|CR\s*[0-9]{1,4})"
+_SUFFIX: Final = r"(?:\s+(\S.*))?"
 _PATTERNS: Final = {
     kind: re.compile(text)
     for kind, text in {
-        "J": r"J\s+P\s*\[\s*([0-9]{1,5})\s*\]\s+([0-9]{1,6}(?:\.[0-9]{1,6})?)\s*(%|sec|msec)\s+(FINE|CNT\s*[0-9]{1,3})",
+        "J": rf"J\s+{_P}([0-9]{{1,6}}(?:\.[0-9]{{1,6}})?)\s*(%|sec|msec)\s+(FINE|CNT\s*[0-9]{{1,3}}){_SUFFIX}",
+        "L": rf"L\s+{_P}{_FEED}{_SUFFIX}",
+        "C": rf"C\s+{_P}{_P}{_FEED}{_SUFFIX}",
         "UFRAME": r"UFRAME_NUM\s*(?:\[\s*GP([1-8])\s*\])?\s*=\s*([0-9]{1,3})",
         "UTOOL": r"UTOOL_NUM\s*(?:\[\s*GP([1-8])\s*\])?\s*=\s*([0-9]{1,3})",
         "OUT": r"DO\s*\[\s*([0-9]{1,5})\s*\]\s*=\s*(ON|OFF)",
         "WAIT": r"WAIT\s+DI\s*\[\s*([0-9]{1,5})\s*\]\s*=\s*(ON|OFF)",
+        "DWELL": r"WAIT\s+([0-9]{0,3}\.[0-9]{2})\s*\(sec\)",
         "CALL": r"CALL\s+([A-Z][A-Z0-9_]*)",
+        "LINE": r"((?:Weave|Track|Arc|Weld)\s.*|CALL\s+\w+\s*\(.*\))",
     }.items()
 }
 
@@ -56,6 +65,7 @@ class TpPose(NamedTuple):
     tool: int  # number of its tool frame
     axes: Mapping[str, str]  # units by name of the axis, in the order of the file
     values: Sequence[float]  # of these axes
+    configuration: str = ""  # of an arm; empty for joint positions
 
 
 class TpPoint(NamedTuple):
@@ -123,7 +133,7 @@ def _groups(lines: Sequence[Statement]) -> frozenset[int]:
 def _statements(lines: Sequence[Statement]) -> list[Statement]:
     """Instructions of the numbered lines, without remarks and empty ones."""
     statements, before = [], 0
-    for line in lines:
+    for line in _whole(lines):
         match = _LINE.fullmatch(line.text)
         if match is None or ";" in match[2]:
             raise line.error("one numbered instruction that ends in a semicolon")
@@ -133,6 +143,22 @@ def _statements(lines: Sequence[Statement]) -> list[Statement]:
         if match[2] and not match[2].startswith("!"):
             statements.append(line._replace(text=match[2]).read_by(_PATTERNS))
     return statements
+
+
+def _whole(lines: Sequence[Statement]) -> Iterator[Statement]:
+    """Lines with those behind them that begin with a colon and continue them."""
+    open_line: Statement | None = None
+    for line in lines:
+        whole = line
+        if open_line is not None:
+            if not line.text.startswith(":"):
+                raise open_line.error("one numbered instruction that ends in a semicolon")
+            whole = open_line._replace(text=f"{open_line.text} {line.text[1:].strip()}")
+        open_line = None if whole.text.endswith(";") else whole
+        if open_line is None:
+            yield whole
+    if open_line is not None:
+        raise open_line.error("one numbered instruction that ends in a semicolon")
 
 
 def _points(lines: Sequence[Statement]) -> dict[int, TpPoint]:
@@ -163,11 +189,11 @@ def _point(begin: Statement, text: str) -> tuple[int, dict[int, TpPose]]:
         group = _GROUP.match(match[2], place)
         if group is None or int(group[1]) in poses:
             raise begin.error("GPn: UF : n, UT : n, and axes in deg or mm, of each group once", match[2][place:])
-        axes = _AXIS.findall(group[4])
+        axes = _AXIS.findall(group[5])
         units = {name: unit for name, _, unit in axes}
         if len(units) < len(axes):
-            raise begin.error("each axis once", group[4].strip())
+            raise begin.error("each axis once", group[5])
         values = [float(value) for _, value, _ in axes]
-        poses[int(group[1])] = TpPose(int(group[2]), int(group[3]), units, values)
+        poses[int(group[1])] = TpPose(int(group[2]), int(group[3]), units, values, group[4] or "")
         place = group.end()
     return int(match[1]), poses
