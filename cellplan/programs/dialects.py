@@ -4,10 +4,13 @@ from collections.abc import Mapping
 from typing import Final
 
 from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.escapes import EscapeForm
 from cellplan.programs.formats.csv import CSV
 from cellplan.programs.formats.fanuc_ls.writer import FANUC_LS
 from cellplan.programs.formats.json_tables import JSON
+from cellplan.programs.formats.krl.escape import KRL_ESCAPE
 from cellplan.programs.formats.krl.writer import KRL
+from cellplan.programs.formats.rapid.escape import RAPID_ESCAPE
 from cellplan.programs.formats.rapid.writer import RAPID
 from cellplan.programs.formats.ros2.writer import ROS2
 from cellplan.programs.formats.stream.writer import STREAM
@@ -17,3 +20,4 @@ from cellplan.programs.formats.val3.writer import VAL3
 DIALECTS: Final[Mapping[str, Dialect]] = {
     dialect.name: dialect for dialect in (CSV, FANUC_LS, JSON, KRL, RAPID, ROS2, STREAM, URSCRIPT, VAL3)
 }
+ESCAPES: Final[Mapping[str, EscapeForm]] = {"krl": KRL_ESCAPE, "rapid": RAPID_ESCAPE}

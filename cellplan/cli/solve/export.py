@@ -9,12 +9,15 @@ from cellplan.cli.options import shared
 from cellplan.cli.options.completion import one_of
 from cellplan.cli.options.given_options import require_choice
 from cellplan.cli.options.request import Options, option
-from cellplan.cli.solve.exported import SCHEMA, result_of_one, result_of_several
-from cellplan.cli.terminal.output import Result
-from cellplan.cli.terminal.progress import progress_listener
-from cellplan.errors import InputError
+from cellplan.cli.solve.exported import SCHEMA, promise_lines, result_of_one, result_of_several
+from cellplan.cli.terminal.output import Result, notes
+from cellplan.cli.terminal.progress import Listener, progress_listener
+from cellplan.errors import ExitStatus, InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cellplan.model.report.verified_run import VerifiedRun
     from cellplan.programs.export.choice import Choice
 
 
@@ -67,6 +70,14 @@ class ExportOptions(Options):
     thin_deg: Annotated[
         float | None, option("--thin-deg DEG", "How far a turning joint may be off there (default: 0.05).")
     ] = None
+    escape: Annotated[
+        bool,
+        option(
+            "--escape",
+            "Programs keep a step register, and escape programs beside them (DIR-escape) bring all robots home from "
+            "wherever they stand between two marks.",
+        ),
+    ] = False
     cell: shared.OriginalCell = None
     without_cell: shared.WithoutCell = False
     controllers: shared.Controllers = None
@@ -95,6 +106,8 @@ def export(options: ExportOptions) -> Result:
     from cellplan.runs.gate.open_gate import open_gate
 
     formats = chosen_formats(options.forms)
+    if options.escape and not all(formats.values()):
+        raise InputError("--escape: expected the formats by name, got all")
     require_choice(options.cell, without_cell=options.without_cell)
     choice = _choice(options)
     single = next(iter(formats)) if list(formats.values()) == [True] else None
@@ -108,11 +121,38 @@ def export(options: ExportOptions) -> Result:
             run = open_gate(options.run, **shared.sources(options), refuse=unfit, progress=progress)
         except NothingFitsError as nothing:
             return result_of_several(nothing.run, folder, nothing.refused)
+        if options.escape:
+            return _escapes(run, folder, formats, choice, progress)
         if single:
             files = export_program(run, folder, form=single, choice=choice, progress=progress)
             return result_of_one(run, folder, single, files=list(files), record=read_stored_export(folder).record)
         exports = export_programs(run, folder, formats=options.forms, choice=choice, progress=progress)
         return result_of_several(run, folder, exports, run.remarks)
+
+
+def _escapes(
+    run: "VerifiedRun", folder: Path, formats: "Mapping[str, bool]", choice: "Choice", progress: Listener
+) -> Result:
+    """Programs with escape programs, in each format that was named: all are written or none."""
+    from cellplan.jobs.escape import escape_lines, escape_programs, write_escape
+    from cellplan.programs.shared import Shared
+
+    shared_results = Shared(run)
+    escapes = {
+        form: escape_programs(run, form, choice, shared=shared_results, progress=progress)
+        for form, is_named in formats.items()
+        if is_named
+    }
+    places = {form: folder if len(formats) == 1 else folder / form for form in escapes}
+    lines, exports = [f"{run.cell.name}: exported {', '.join(escapes)} with escape programs"], []
+    for form, escape in escapes.items():
+        escape_folder = write_escape(places[form], escape)
+        lines += [f"  {form}: {places[form]}", *(f"  {line}" for line in promise_lines(escape.record))]
+        lines += [f"    escape: {escape_folder}", *(f"    {line}" for line in escape_lines(escape.escape_record))]
+        exports.append({"format": form, "folder": str(places[form]), "escape": escape.escape_record})
+    about = {"schema": SCHEMA, "status": "exported", "exit": int(ExitStatus.PASSED), "folder": str(folder)}
+    what = {"run": run.digest, "remarks": list(run.remarks), "exports": exports}
+    return Result(ExitStatus.PASSED, [*lines, *notes(run.remarks)], {**about, **what})
 
 
 def _choice(options: ExportOptions) -> "Choice":
@@ -125,4 +165,5 @@ def _choice(options: ExportOptions) -> "Choice":
     for name, word, known in (("moves", options.moves, moves), ("promise", options.promise, promises)):
         if word not in known:
             raise InputError(f"--{name}: expected one of {', '.join(filter(None, known))}, got '{word}'")
-    return options.to(Choice, moves=moves[options.moves], promise=promises[options.promise])
+    promise = promises[options.promise or ("sequence" if options.escape else None)]
+    return options.to(Choice, moves=moves[options.moves], promise=promise, steps=options.escape)

@@ -143,7 +143,7 @@ class RobotControlEntry(Entry):
     """Where a robot is connected, and how programs of its controller name things."""
 
     NAMES: ClassVar[Set[str]] = frozenset(
-        {"task", "group", "decimals", "tool_number", "base_number", "frames", "handshake"}
+        {"task", "group", "decimals", "tool_number", "base_number", "frames", "handshake", "step_register"}
     )  # keys that no proof depends on
     id: Name = Field(description="Name of its controller under controllers.")
     task: Identifier | None = Field(
@@ -185,6 +185,11 @@ class RobotControlEntry(Entry):
     )
     handshake: HandshakeEntry | None = Field(
         default=None, description="Signals with which it waits for other robots; none when absent."
+    )
+    step_register: Signal | None = Field(
+        default=None,
+        description="Variable, or number of the register, in which its program keeps the step that an escape program "
+        "begins from; cell_step when absent.",
     )
 
     @model_validator(mode="before")

@@ -56,8 +56,7 @@ def to_numbers(robot: Robot, q: Array, *, decimals: int, angle: Angle = Angle.DE
     bit; ``InputError`` where one cannot be written with the decimals.
     """
     joints, quantum = robot.model.joints, 10.0**decimals
-    scale = np.array([1.0 if angle is Angle.RADIANS else joint.display_unit.scale for joint in joints])
-    numbers = _zero(robot).from_model(q) * scale
+    numbers = exact_numbers(robot, q, angle=angle)
     if not np.all(np.abs(numbers) < LARGEST):
         raise InputError(f"robot '{robot.name}': expected positions below {LARGEST:g}, got one that is too large")
     quanta = np.rint(numbers * quantum)
@@ -73,6 +72,14 @@ def to_numbers(robot: Robot, q: Array, *, decimals: int, angle: Angle = Angle.DE
     raise InputError(
         f"robot '{robot.name}': joint {at}: no number with {decimals} decimals near its limit lies within its limits"
     )
+
+
+def exact_numbers(robot: Robot, q: Array, *, angle: Angle = Angle.DEGREES) -> Array:
+    """Positions of the controller in the units of a file, not rounded, of the model in [rad] or [m], shape (N, n)."""
+    joints = robot.model.joints
+    scale = np.array([1.0 if angle is Angle.RADIANS else joint.display_unit.scale for joint in joints])
+    numbers: Array = _zero(robot).from_model(q) * scale
+    return numbers
 
 
 def from_numbers(robot: Robot, numbers: Array, *, angle: Angle = Angle.DEGREES) -> Array:

@@ -16,8 +16,9 @@ from cellplan.files.run.folder import EXPORT, PROGRAMS, RunFolder, refuse_unless
 from cellplan.model.motion.motion import JointTable
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.verified_run import VerifiedMotion, VerifiedRun
-from cellplan.programs.dialects import DIALECTS
+from cellplan.programs.dialects import DIALECTS, ESCAPES
 from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.escapes import with_register
 from cellplan.programs.export.choice import Choice
 from cellplan.programs.export.prepare import prepare
 from cellplan.programs.export.record import Record, export_record, record_text, table_record
@@ -50,9 +51,19 @@ def require_format(name: str, *, option: str = "--format") -> None:
         raise InputError(f"{option}: expected one of {listed(EXPORTERS)}, got '{name}'{hint}")
 
 
+def exporter_of(form: str, choice: Choice) -> Dialect | Exporter:
+    """What writes and reads a format as it is chosen; ``InputError`` where it has no step registers."""
+    dialect = EXPORTERS[form]
+    if not choice.steps:
+        return dialect
+    if form not in ESCAPES or not isinstance(dialect, Dialect):
+        raise InputError(f"--escape: expected one of the formats {listed(ESCAPES)}, got {form}")
+    return with_register(dialect, ESCAPES[form])
+
+
 def refuse_choice(form: str, choice: Choice) -> None:
     """Refuse what a format cannot do whatever the run; call it early, before any long work."""
-    dialect = EXPORTERS[form]
+    dialect = exporter_of(form, choice)
     if isinstance(dialect, Dialect):
         choice.refuse_for(dialect)
     elif choice != Choice():
@@ -127,7 +138,7 @@ def exported(
         InputError: The format cannot hold what was chosen, or something is not stated in the cell.
         NotVerifiedError: A check fails on what the files hold, or nothing can be promised of them.
     """
-    dialect, shared = EXPORTERS[form], shared or Shared(run)
+    dialect, shared = exporter_of(form, choice), shared or Shared(run)
     if isinstance(dialect, Dialect):
         prepared = prepare(run, dialect, choice, shared=shared, progress=progress)
         written = write(run, prepared, progress=progress)

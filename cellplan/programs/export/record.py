@@ -42,6 +42,7 @@ def export_record(run: VerifiedRun, prepared: PreparedExport, written: Written) 
         "thinning": None if prepared.thinning is None else dict(zip(("mm", "deg"), prepared.thinning, strict=True)),
         "blend": written.job.blend,
         "rounded": _rounded(written),
+        **({"steps": True} if prepared.dialect.sets_steps else {}),
     }
     return _record(run, prepared.dialect.name, about, written.files)
 

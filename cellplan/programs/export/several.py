@@ -18,6 +18,7 @@ from cellplan.programs.export.prepare import refuse_unfit
 from cellplan.programs.export.program import (
     EXPORTERS,
     exported,
+    exporter_of,
     refuse_choice,
     refuse_unless_exportable,
     require_format,
@@ -122,8 +123,8 @@ def refuse_unfit_run(run: ReadRun, formats: Mapping[str, bool], choice: Choice, 
     refuse_unknown_robots(run.cell, choice.robots)
     refused: list[Exported] = []
     for form, is_named in formats.items():
-        dialect = EXPORTERS[form]
         try:
+            dialect = exporter_of(form, choice)
             refuse_choice(form, choice)
             if isinstance(dialect, Dialect):
                 refuse_unfit(run, dialect, choice)

@@ -61,6 +61,7 @@ class StoredExport:
             thin_mm=mm,
             thin_deg=deg,
             promise=self._one_of("asked_promise", Promise) if is_requested else None,
+            steps=self.record.get("steps") is True,
         )
 
     def changed(self) -> Iterator[InputError]:

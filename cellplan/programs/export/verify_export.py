@@ -14,7 +14,7 @@ from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.export.choice import Choice
 from cellplan.programs.export.prepare import frame_of, prepare
-from cellplan.programs.export.program import EXPORTERS, require_format, verify_rounded
+from cellplan.programs.export.program import EXPORTERS, exporter_of, require_format, verify_rounded
 from cellplan.programs.export.record import export_record, table_record
 from cellplan.programs.export.stored import StoredExport, refuse_other_run
 from cellplan.programs.export.written import judged, with_notes
@@ -68,7 +68,7 @@ def _made_again(
     stored: StoredExport, run: VerifiedRun, choice: Choice, *, read: Any, progress: Progress = silent
 ) -> tuple[Mapping[str, str], Mapping[str, Any]]:
     """The files and the record that the run gives, after all checks were made on what was read."""
-    dialect = EXPORTERS[stored.form]
+    dialect = exporter_of(stored.form, choice)
     try:
         if isinstance(dialect, Dialect):
             prepared = prepare(run, dialect, choice, progress=progress)
@@ -86,7 +86,7 @@ def _made_again(
 
 def _read(stored: StoredExport, run: VerifiedRun, choice: Choice) -> Any:
     """What the reader of the format finds in the files."""
-    dialect = EXPORTERS[stored.form]
+    dialect = exporter_of(stored.form, choice)
     try:
         if not isinstance(dialect, Dialect):
             return dialect.read(run, stored.files)

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import raise_findings, refusals
+from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, ProgramRows, Promise
 from cellplan.programs.elements.corners import LARGEST_SHARE, moves, row_shares
 from cellplan.programs.elements.dialect import Dialect
@@ -119,15 +120,19 @@ def _modules(program: PagedProgram) -> dict[str, str]:
 
 
 def _setup(program: PagedProgram) -> list[str]:
-    """What is set before the first motion. Targets are joint positions: neither tool nor base moves them."""
-    control = program.placed.control
+    """What is set before the first motion."""
+    return [*frames_set(program.placed), *map(signal_text, program.first)]
+
+
+def frames_set(placed: Robot) -> list[str]:
+    """Advance, tool and base of a robot. Targets are joint positions: neither moves them."""
+    control = placed.control
     tool, base = (None, None) if control is None else (control.tool_number, control.base_number)
     return [
         "BAS(#INITMOV,0)",
         f"$ADVANCE={ADVANCE}",
         f"$TOOL={f'TOOL_DATA[{tool}]' if tool else '$NULLFRAME'}",
         f"$BASE={f'BASE_DATA[{base}]' if base else '$NULLFRAME'}",
-        *map(signal_text, program.first),
     ]
 
 

@@ -1,0 +1,281 @@
+"""Escape programs: for each step of a program the way home from wherever robots stand between two marks, certified."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.cache import without_cache
+from cellplan.errors import NotVerifiedError
+from cellplan.files.input.files import digest
+from cellplan.files.input.findings import listed
+from cellplan.geometry.transforms import Array
+from cellplan.jobs.recover.legs import WRITTEN_TOL, Leg, Track, bends, leg_findings, recovery_legs, recovery_rows
+from cellplan.jobs.recover.recover import Recovery, recover
+from cellplan.jobs.recover.state import RunPlaces
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report.exported import ProgramRows, Promise
+from cellplan.model.report.report import CAUTION
+from cellplan.model.report.verified_run import VerifiedRun
+from cellplan.programs.dialects import ESCAPES
+from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.escapes import EscapeForm, EscapeProgram, EscapeStep, read_escape
+from cellplan.programs.elements.head import head_notes
+from cellplan.programs.elements.joints import Angle, exact_numbers
+from cellplan.programs.elements.text import comment
+from cellplan.programs.export.choice import Choice
+from cellplan.programs.export.notes import READ_BACK
+from cellplan.programs.export.prepare import PreparedExport, prepare
+from cellplan.programs.export.program import exporter_of, write_export
+from cellplan.programs.export.record import Record, export_record
+from cellplan.programs.export.written import read_files, write
+from cellplan.programs.promises.orders import Orders
+from cellplan.programs.promises.promises import waits
+from cellplan.programs.rows.margins import corner_vectors
+from cellplan.programs.shared import Shared
+from cellplan.runs.write_run import versions
+
+SCHEMA: Final = "cellplan.escape/1"
+OFF: Final = 0.1  # [deg] or [mm] that a robot may stand off its rows, beside what rounding puts it off
+OFF_RADIANS: Final = 0.0017  # [rad] the same
+ROUNDED_OFF: Final = 1.03  # [-] rounding of zones to sizes that are written
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Homeward:
+    """The way home from a mark."""
+
+    number: int  # of the step that begins there, from 1
+    phase: str  # name of the phase of the step
+    recovery: Recovery  # from the mark home
+    legs: tuple[Leg, ...]  # what lies between two waits on it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WrittenEscape:
+    """Main programs that set their step registers, and the escape programs to them."""
+
+    files: Mapping[str, str]  # of the main programs
+    record: Record  # of these
+    main: ProgramRows  # rows of these as they were read
+    routes: tuple[Homeward, ...]  # the way home of each step
+    programs: Mapping[str, EscapeProgram]  # by robot
+    escape_files: Mapping[str, str]
+    escape_record: Record
+
+
+def homewards(run: VerifiedRun, orders: Orders, progress: Progress = silent) -> tuple[Homeward, ...]:
+    """The way home from each mark but the last one, with every order of the robots between two waits certified.
+
+    A ``NotVerifiedError`` has the step and its phase where there is none, with the robots or bodies that bar it.
+    """
+    places, routes = RunPlaces.of(run), list[Homeward]()
+    for number, (at, stretch) in enumerate(zip(orders.times[:-1], orders.stretches, strict=True), start=1):
+        progress("planning the ways home", (number - 1) / len(orders.stretches))
+        where = f"no way home from step {number}, '{stretch.phase}' from {at:g} s: "
+        try:
+            recovery = recover(run, at=at)
+            legs = recovery_legs(places, recovery.state, recovery.phases) if recovery.succeeded else ()
+        except NotVerifiedError as error:
+            raise NotVerifiedError([where + finding for finding in error.findings]) from None
+        if not recovery.succeeded:
+            raise NotVerifiedError([where + recovery.reason])
+        routes.append(Homeward(number=number, phase=stretch.phase, recovery=recovery, legs=legs))
+    return tuple(routes)
+
+
+def escape_programs(
+    run: VerifiedRun, form: str, choice: Choice, *, shared: Shared | None = None, progress: Progress = silent
+) -> WrittenEscape:
+    """The programs of a run in one format, with step registers, and the escape programs to them, judged as read back.
+
+    Raises:
+        InputError: The format has no escape programs, or something is not stated in the cell.
+        NotVerifiedError: The programs cannot be written, there is no way home from a mark, or a check fails.
+    """
+    choice, shared = replace(choice, steps=True, promise=choice.promise or Promise.SEQUENCE_ONLY), shared or Shared(run)
+    dialect, escape = exporter_of(form, choice), ESCAPES.get(form)
+    if escape is None or not isinstance(dialect, Dialect):
+        raise ValueError(f"{form}: expected a format with escape programs")
+    prepared = prepare(run, dialect, choice, shared=shared, progress=progress)
+    written = write(run, prepared, progress=progress)
+    (main,) = read_files(prepared, written.files)
+    (orders,) = prepared.orders
+    with without_cache():
+        routes = shared.once("homewards", lambda: homewards(run, orders, progress))
+        programs = _programs(run, prepared, escape, main, routes)
+        files = {name: escape.render(program) for name, program in programs.items()}
+        findings = list(escape_findings(run, escape, programs, routes, main, files))
+    if findings:
+        raise NotVerifiedError([f"{form}: escape: {finding}" for finding in findings])
+    joined = {path: text for of_robot in files.values() for path, text in of_robot.items()}
+    record = export_record(run, prepared, written)
+    about = _record(run, form, programs, routes, orders, joined)
+    return WrittenEscape(
+        files=written.files,
+        record=record,
+        main=main,
+        routes=routes,
+        programs=programs,
+        escape_files=joined,
+        escape_record=about,
+    )
+
+
+def write_escape(folder: Path, escape: WrittenEscape) -> Path:
+    """Write main programs to a folder and escape programs to another one beside it, which is returned."""
+    escape_folder = folder.with_name(f"{folder.name}-escape")
+    write_export(folder, escape.files, escape.record)
+    write_export(escape_folder, escape.escape_files, escape.escape_record)
+    return escape_folder
+
+
+def escape_lines(record: Record) -> Iterator[str]:
+    """The lines of the record of escape programs."""
+    for step in record["steps"]:
+        yield f"{step['number']}. {step['phase']}, {step['from_s']:g} to {step['to_s']:g} s: {'; '.join(step['way'])}"
+    if record["by_hand"]:
+        yield f"no format writes that of {listed(record['by_hand'])}: program its steps by hand"
+
+
+def escape_findings(
+    run: VerifiedRun,
+    form: EscapeForm,
+    programs: Mapping[str, EscapeProgram],
+    routes: Sequence[Homeward],
+    main: ProgramRows,
+    files: Mapping[str, Mapping[str, str]],
+) -> Iterator[str]:
+    """What does not hold of the files of escape programs, by robot, as they are read.
+
+    The way back is that of the main program as it was read: its rows backwards, between the same two marks, within
+    which every order was certified. The ways home are judged as recoveries are.
+    """
+    places, read = RunPlaces.of(run), dict[str, EscapeProgram]()
+    for name, expected in programs.items():
+        read[name] = program = read_escape(form, expected, files[name])
+        if not np.array_equal(program.rows, main.robots[name].q):
+            yield f"'{name}': expected the rows of its main program, read others"
+        if program.steps != expected.steps:
+            yield f"'{name}': expected the steps of its main program, read others"
+        shapes = program.homeward.shape, expected.homeward.shape
+        if shapes[0] != shapes[1] or np.any(np.abs(program.homeward - expected.homeward) > WRITTEN_TOL):
+            yield f"'{name}': expected the planned rows of the ways home, read others"
+            return
+    for route in routes:
+        tracks = _tracks(places, route, read)
+        for finding in leg_findings(places, route.recovery.state, route.recovery.phases, tracks):
+            yield f"step {route.number}: {finding}"
+
+
+def _tracks(
+    places: RunPlaces, route: Homeward, read: Mapping[str, EscapeProgram]
+) -> list[tuple[Leg, dict[str, Track]]]:
+    """What each robot passes on a way home: as it was read, or as it was planned where it has no program."""
+    rows, tracks = recovery_rows(route.recovery.phases), list[tuple[Leg, dict[str, Track]]]()
+    at = {name: program.rows[program.steps[route.number - 1].first - 1] for name, program in read.items()}
+    for place, leg in enumerate(route.legs):
+        by_robot = {}
+        for robot in places.cell.robots:
+            q = rows[leg.first : leg.last + 1, places.cell.columns(robot.name)]
+            if robot.name in read:
+                program = read[robot.name]
+                span = program.steps[route.number - 1].legs[place] or (1, 0)
+                q = np.concatenate([at[robot.name][None], program.homeward[span[0] - 1 : span[1]]])
+                at[robot.name] = q[-1]
+            by_robot[robot.name] = Track(np.linspace(0.0, 1.0, len(q)), q)
+        tracks.append((leg, by_robot))
+    return tracks
+
+
+def _programs(
+    run: VerifiedRun, prepared: PreparedExport, form: EscapeForm, main: ProgramRows, routes: Sequence[Homeward]
+) -> dict[str, EscapeProgram]:
+    """The escape program of each robot that is exported."""
+    frame, cell, programs = prepared.job.frame, run.cell, dict[str, EscapeProgram]()
+    for name in frame.robots:
+        marks, steps, homeward = main.robots[name].marks, list[EscapeStep](), [main.robots[name].q[:1]]
+        for route in routes:
+            rows, legs = recovery_rows(route.recovery.phases)[:, cell.columns(name)], list[tuple[int, int] | None]()
+            for leg in route.legs:
+                q = rows[leg.first : leg.last + 1]
+                moved = q[bends(q)[1:]] if np.any(q != q[0]) else q[:0]
+                begin = sum(map(len, homeward))
+                legs.append((begin + 1, begin + len(moved)) if len(moved) else None)
+                homeward.append(moved)
+            first, last = marks[route.number - 1], marks[route.number]
+            off = _off(prepared, main, name, slice(first, last + 1), form.angle)
+            steps.append(EscapeStep(route.number, first + 1, last + 1, off, tuple(legs)))
+        notes = [line[2:] for note in _notes(run, prepared, name) for line in comment(note, "#")]
+        programs[name] = EscapeProgram(
+            frame=frame,
+            robot=name,
+            notes=tuple(notes),
+            rows=main.robots[name].q,
+            homeward=np.concatenate(homeward),
+            steps=tuple(steps),
+        )
+    return programs
+
+
+def _off(prepared: PreparedExport, main: ProgramRows, name: str, rows: slice, angle: Angle) -> str:
+    """How far a robot may stand off some of its rows, in the units of the program: with all that rounding may do."""
+    written, read = prepared.job.programs[0].robots[name], main.robots[name]
+    shares: Array = np.zeros(len(read)) if read.rounding is None else ROUNDED_OFF * read.rounding
+    robot = prepared.job.frame.robot(name)
+    numbers = [
+        exact_numbers(robot, q, angle=angle)
+        for q in (read.q, read.q + corner_vectors(replace(written, q=read.q), shares))
+    ]
+    least, decimals = (OFF_RADIANS, 6) if angle is Angle.RADIANS else (OFF, 4)
+    rounding = np.linalg.norm(numbers[1] - numbers[0], axis=1)[rows].max(initial=0.0)
+    return f"{least + rounding:.{decimals}f}"
+
+
+def _notes(run: VerifiedRun, prepared: PreparedExport, robot: str) -> Iterator[str]:
+    """Notes for the head of an escape program."""
+    yield f"cell {run.cell.name}, escape program to {prepared.dialect.name}"
+    yield "from between two marks back along the rows to the first of them, then home"
+    yield "start it on all robots; step registers that differ by one keep them from moving"
+    yield "all robots then stand at a mark: set the larger number on all controllers"
+    yield "every row is a stop"
+    yield f"run {run.digest}"
+    yield READ_BACK
+    yield from head_notes(prepared.job, robot)
+
+
+def _record(
+    run: VerifiedRun,
+    form: str,
+    programs: Mapping[str, EscapeProgram],
+    routes: Sequence[Homeward],
+    orders: Orders,
+    files: Mapping[str, str],
+) -> dict[str, Any]:
+    """What the record says of escape programs."""
+    steps = [
+        {
+            "number": route.number,
+            "phase": route.phase,
+            "from_s": orders.times[route.number - 1],
+            "to_s": orders.times[route.number],
+            "way": [phase.words for phase in route.recovery.phases],
+            "waits": len(route.legs) + 1,
+        }
+        for route in routes
+    ]
+    return {
+        "schema": SCHEMA,
+        "cell": run.cell.name,
+        "format": form,
+        "robots": list(programs),
+        "by_hand": [robot.name for robot in run.cell.robots if not waits(run.cell, robot.name)],
+        "registers": {name: program.register for name, program in programs.items()},
+        "steps": steps,
+        "run": run.digest,
+        "versions": versions(),
+        "files": {path: digest(text.encode()) for path, text in files.items()},
+        "caution": CAUTION,
+    }

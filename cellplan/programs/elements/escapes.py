@@ -1,0 +1,247 @@
+"""Escape programs: back along the rows to the last mark, and from there home; what the languages of makers share.
+
+A program sets its step register at each mark, between the two halves of the handshake: no robot leaves a mark before
+the registers of all have its number. So they differ by no more than one, and only where all robots stand at a mark.
+
+Before anything moves escape programs find out whether they do: with an even number the leader answers, with an odd
+one it asks, and who asks looks first whether another one does. Two that ask at once go on together, but then the leader
+looks once more after a pause. Programs of even and of odd numbers wait for one another without end.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell.cell import Robot
+from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows
+from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step
+from cellplan.programs.elements.joints import Angle, from_numbers
+
+REGISTER: Final = "cell_step"  # name of a step register where the cell states none
+SPEED: Final = 10  # [%] of the top speed
+
+
+class EscapeStep(NamedTuple):
+    """What is done where all robots are between two marks; rows count from 1."""
+
+    number: int  # what the step register holds
+    first: int  # row of the program at the mark before
+    last: int  # row at the mark behind
+    off: str  # distance from the rows up to which a robot stands on them, in the units of the program
+    legs: tuple[tuple[int, int] | None, ...]  # rows on the way home between two waits; None for a robot that stands
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class EscapeProgram:
+    """What the escape program of one robot holds."""
+
+    frame: ExportFrame  # that of its main program
+    robot: str
+    notes: tuple[str, ...]  # lines of the head, without the sign of a comment
+    rows: Array  # of the main program in [rad] or [m], shape (N, n)
+    homeward: Array  # of all ways home, likewise; one at least
+    steps: tuple[EscapeStep, ...]
+
+    @property
+    def register(self) -> str:
+        """Name or number of its step register."""
+        return register_of(self.frame, self.robot)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EscapeForm:
+    """How a language writes escape programs, and the step register in main programs."""
+
+    sign: str  # of a comment
+    case: str  # statements with their fields in braces: where a step begins
+    back: str
+    go: str
+    meet: str
+    agree: tuple[str, str]  # with an even number and with an odd one
+    pause: str  # longer than signals take
+    register: str
+    tables: tuple[str, str]  # what a line with the beginning of the rows of the program holds, and of those home
+    row: str  # pattern of a row, with its numbers as the only group
+    numbers: Callable[[Robot, str], Sequence[float]]  # numbers of the joints of a row, in the order of the model
+    angle: Angle
+    instruction: Callable[[HandshakeStep], Sequence[str]]  # lines of an instruction of a handshake
+    sources: Callable[[ExportFrame, str], str]  # pattern of the paths of a main program that hold its marks
+    render: Callable[[EscapeProgram], dict[str, str]]
+    require: Callable[[ExportFrame, str], None]  # refuses a register that the language does not take
+
+    def calls(self, step: EscapeStep, register: str) -> Iterator[str]:
+        """Statements of a step, from its begin. None is known any more as soon as one robot may be on its way home."""
+        yield self.case.format(number=step.number)
+        yield self.agree[step.number % 2]
+        yield self.back.format(first=step.first, last=step.last, off=step.off)
+        yield self.meet
+        yield self.register.format(name=register, value=0)
+        for leg in step.legs:
+            if leg is not None:
+                yield self.go.format(first=leg[0], last=leg[1])
+            yield self.meet
+
+    def waits(self, frame: ExportFrame, robot: str) -> Iterator[tuple[str, list[str]]]:
+        """Routines in which robots wait for one another: statement that calls each, and its lines."""
+        yield self.meet, [line for step in handshake_steps(frame, robot) for line in self.instruction(step)]
+        for is_odd, name in enumerate(self.agree):
+            steps = agreement_steps(frame, robot, is_odd=bool(is_odd))
+            yield name, [line for step in steps for line in ([self.pause] if step is None else self.instruction(step))]
+
+
+def agreement_steps(frame: ExportFrame, robot: str, *, is_odd: bool) -> list[HandshakeStep | None]:
+    """Instructions by which robots find out whether all have even or all odd numbers; None for a pause."""
+    steps, leads = handshake_steps(frame, robot), robot == frame.cell.robots[0].name
+    raised, lowered = ([step for step in steps if step.waits and step.is_on is is_on] for is_on in (True, False))
+    raising, lowering = (next(s for s in steps if not s.waits and s.is_on is is_on) for is_on in (True, False))
+    if is_odd is not leads:
+        answers = [*raised, raising, *lowered, lowering]
+        return [*answers, *answers, None]
+    pause = [None, *lowered] if leads else []
+    asks: list[HandshakeStep | None] = [*lowered, *pause, raising, *raised, lowering, *lowered]
+    return [*asks, *asks, None]
+
+
+def register_of(frame: ExportFrame, robot: str) -> str:
+    """Name or number of the step register of a robot."""
+    control = frame.robot(robot).control
+    return REGISTER if control is None or control.step_register is None else str(control.step_register)
+
+
+def with_register(dialect: Dialect, form: EscapeForm) -> Dialect:
+    """A format whose programs set their step register at each mark, and whose reader expects just that."""
+
+    def render(job: ExportJob) -> dict[str, str]:
+        return _with_steps(form, job.frame, dialect.render(job))
+
+    def read(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
+        statement = _pattern(form.register)
+        plain, blank = dict[str, str](), dict[str, str]()
+        for path, text in files.items():
+            lines = text.split("\n")
+            is_step = [bool(statement.fullmatch(line.strip())) for line in lines]
+            plain[path] = "\n".join(line for line, step in zip(lines, is_step, strict=True) if not step)
+            blank[path] = "\n".join(
+                line[len(line.rstrip("\r")) :] if step else line for line, step in zip(lines, is_step, strict=True)
+            )
+        for path, text in _with_steps(form, frame, plain).items():
+            require_same(path, text, files[path])
+        return dialect.read(frame, blank)
+
+    def demands(frame: ExportFrame, rows: int) -> Iterator[Callable[[], object]]:
+        yield partial(_require_marks, frame)
+        yield from (partial(form.require, frame, robot) for robot in frame.robots)
+        yield from dialect.demands(frame, rows)
+
+    return replace(dialect, render=render, read=read, demands=demands, sets_steps=True)
+
+
+def _require_marks(frame: ExportFrame) -> None:
+    """Refuse cells in which robots do not wait for one another in one program."""
+    if len(frame.cell.robots) < 2 or frame.programs != (None,):
+        got = f"{len(frame.cell.robots)} robots and {len(frame.programs)} programs"
+        raise InputError(f"--escape: expected robots that wait for one another in one program from home, got {got}")
+
+
+def read_escape(form: EscapeForm, expected: EscapeProgram, files: Mapping[str, str]) -> EscapeProgram:
+    """What the files of an escape program hold: rows and steps as they stand there, all else as it is written.
+
+    ``InputError`` with file and line for any other statement. Of what is expected only frame and robot are used.
+    """
+    robot = expected.frame.robot(expected.robot)
+    reader, notes = _EscapeReader(form, robot), list[str]()
+    for place, (path, text) in enumerate(files.items()):
+        for number, line in enumerate(map(str.strip, text.split("\n")), start=1):
+            if line.startswith(form.sign):
+                notes += [] if place else [line.removeprefix(form.sign).strip()]
+                continue
+            try:
+                reader.take(line)
+            except (ValueError, IndexError):
+                raise InputError(f"{path}:{number}: expected plain numbers, got {line[:60]!r}") from None
+    rows, homeward = (
+        from_numbers(robot, np.array(table, dtype=float).reshape(-1, len(robot.model.joints)), angle=form.angle)
+        for table in reader.tables
+    )
+    read = replace(expected, notes=tuple(notes), rows=rows, homeward=homeward, steps=tuple(reader.steps))
+    for path, text in form.render(read).items():
+        require_same(path, text, files.get(path, ""))
+    return read
+
+
+class _EscapeReader:
+    """Rows and steps as they are found line by line.
+
+    Attributes:
+        tables: Numbers of the rows of the program, and of those home.
+        steps: The steps so far.
+    """
+
+    def __init__(self, form: EscapeForm, robot: Robot) -> None:
+        """Begin with nothing."""
+        self._form, self._robot = form, robot
+        self._patterns = [_pattern(statement) for statement in (form.case, form.back, form.go)]
+        self.tables: tuple[list[Sequence[float]], list[Sequence[float]]] = ([], [])
+        self.steps: list[EscapeStep] = []
+        self._table, self._waits = 0, 0
+        self._leg: tuple[int, int] | None = None
+
+    def take(self, line: str) -> None:
+        """Take in what a line holds; a ``ValueError`` or ``IndexError`` where its numbers are none."""
+        self._table = next((at for at, begin in enumerate(self._form.tables) if begin in line), self._table)
+        case, back, go = (pattern.fullmatch(line) for pattern in self._patterns)
+        if row := re.fullmatch(self._form.row, line):
+            self.tables[self._table].append(self._form.numbers(self._robot, row[1]))
+        elif case:
+            self.steps.append(EscapeStep(int(case["number"]), 0, 0, "", ()))
+            self._waits, self._leg = 0, None
+        elif back:
+            step = self.steps[-1]._replace(first=int(back["first"]), last=int(back["last"]), off=back["off"])
+            self.steps[-1] = step
+        elif go:
+            self._leg = int(go["first"]), int(go["last"])
+        elif line == self._form.meet and self.steps:
+            legs = (*self.steps[-1].legs, self._leg) if self._waits else ()
+            self.steps[-1] = self.steps[-1]._replace(legs=legs)
+            self._waits, self._leg = self._waits + 1, None
+
+
+def require_same(path: str, expected: str, got: str) -> None:
+    """Refuse a text at its first line that is another one."""
+    for number, (one, other) in enumerate(zip(expected.split("\n"), [*got.split("\n"), ""], strict=False), start=1):
+        if one != other:
+            raise InputError(f"{path}:{number}: expected {one.strip()[:60]!r}, got {other.strip()[:60]!r}")
+    if expected != got:
+        raise InputError(f"{path}: expected {expected.count(chr(10))} lines, got {got.count(chr(10))}")
+
+
+def _pattern(statement: str) -> re.Pattern[str]:
+    """A statement with any numbers in its fields."""
+    return re.compile(re.sub(r"\\{(\w+)\\}", r"(?P<\1>\\w[\\w.]*)", re.escape(statement)))
+
+
+def _with_steps(form: EscapeForm, frame: ExportFrame, files: Mapping[str, str]) -> dict[str, str]:
+    """Files of main programs with their step registers: 0 before the first motion, then the number of each mark."""
+    result = dict(files)
+    for robot in frame.robots:
+        steps, register, number = handshake_steps(frame, robot), register_of(frame, robot), -1
+        first, half = form.instruction(lowering_step(frame, robot)), form.instruction(steps[len(steps) // 2 - 1])
+        sources = form.sources(frame, robot)
+        for path in sorted(path for path in files if re.fullmatch(sources, path)):
+            lines, texts = list[str](), files[path].split("\n")
+            for at, line in enumerate(texts, start=1):
+                lines.append(line)
+                anchor = first if number < 0 else half
+                if [text.strip() for text in texts[max(at - len(anchor), 0) : at]] == list(anchor):
+                    number += 1
+                    indent, end = line[: len(line) - len(line.lstrip())], line[len(line.rstrip("\r")) :]
+                    lines.append(f"{indent}{form.register.format(name=register, value=number)}{end}")
+            result[path] = "\n".join(lines)
+    return result

@@ -1,0 +1,183 @@
+"""Escape programs: what is written is read back, nothing else is read, and what a controller makes of the texts."""
+
+import re
+from dataclasses import replace
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from builders.escape_players import Robot, play
+from builders.export_jobs import cell_of, controlled, two_arms
+from builders.rapid_jobs import sequence_job
+from builders.scene_builders import arm_model
+
+from cellplan.errors import InputError, refusals
+from cellplan.model.report.exported import ExportFrame, ExportJob, Promise
+from cellplan.programs.dialects import DIALECTS, ESCAPES
+from cellplan.programs.elements.escapes import EscapeProgram, EscapeStep, read_escape, with_register
+from cellplan.programs.elements.joints import from_numbers, to_numbers
+
+FORMS = ("krl", "rapid")
+
+
+def job_in(form: str) -> ExportJob:
+    """A program of two robots that meet at three marks."""
+    return two_arms("kuka", seed=3) if form == "krl" else sequence_job(seed=3)
+
+
+def escape_of(job: ExportJob, robot: str) -> EscapeProgram:
+    """Ways home that lead from each mark over three rows, in two legs, in the second of which it stands."""
+    rows = job.programs[0].robots[robot]
+    q = from_numbers(job.frame.robot(robot), to_numbers(job.frame.robot(robot), rows.q, decimals=4))
+    pairs = zip(rows.marks[:-1], rows.marks[1:], strict=True)
+    steps = tuple(
+        EscapeStep(number, first + 1, last + 1, "0.1000", ((3 * number - 1, 3 * number + 1), None))
+        for number, (first, last) in enumerate(pairs, start=1)
+    )
+    homeward = q[np.arange(1 + 3 * len(steps)) % len(q)]
+    return EscapeProgram(frame=job.frame, robot=robot, notes=("a note",), rows=q, homeward=homeward, steps=steps)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_programs_set_their_register_at_each_mark_and_are_read_with_these_numbers_only(form: str) -> None:
+    job, plain = job_in(form), DIALECTS[form]
+    dialect = with_register(plain, ESCAPES[form])
+    files = dialect.render(job)
+    (read,) = dialect.read(job.frame, files)
+    (expected,) = plain.read(job.frame, plain.render(job))
+
+    setting = re.compile(r"^ *cell_step ?:?= ?(\d);?\r?\n", re.MULTILINE)
+    for name, rows in expected.robots.items():
+        np.testing.assert_array_equal(read.robots[name].q, rows.q)
+        assert read.robots[name].marks == rows.marks
+    for path, text in files.items():
+        numbers = [match[1] for match in setting.finditer(text)]
+        assert numbers in ([], ["0", "1", "2", "3"])
+        for match in setting.finditer(text):
+            lines = match[0]
+            other = f"{lines[: lines.index(match[1])]}7{lines[lines.index(match[1]) + 1 :]}"
+            for changed in ("", other, lines + lines):
+                with pytest.raises(InputError, match=rf"^{path}:\d+: expected '"):
+                    dialect.read(job.frame, {**files, path: text[: match.start()] + changed + text[match.end() :]})
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_escape_programs_are_read_back_and_every_change_is_noticed(form: str) -> None:
+    job, escape, rng = job_in(form), ESCAPES[form], np.random.default_rng(5)
+    name = job.frame.robots[1]
+    program = escape_of(job, name)
+    files = escape.render(program)
+    read = read_escape(escape, program, files)
+
+    assert (read.steps, read.notes) == (program.steps, program.notes)
+    np.testing.assert_array_equal(read.rows, program.rows)
+    np.testing.assert_array_equal(read.homeward, program.homeward)
+    for _ in range(150):
+        path = sorted(files)[int(rng.integers(len(files)))]
+        lines = files[path].split("\n")
+        place = int(rng.integers(len(lines) - 1))
+        line = lines[place]
+        if line.strip().startswith(escape.sign):
+            continue
+        at = int(rng.integers(max(len(line), 1)))
+        letter = "0123456789ABCDEFabcdef.+-,()"[int(rng.integers(28))]
+        changed = [[line[:at] + letter + line[at + 1 :]], [], [line, line]][int(rng.integers(3))]
+        if changed == [line]:
+            continue
+        text = "\n".join([*lines[:place], *changed, *lines[place + 1 :]])
+        try:
+            other = read_escape(escape, program, {**files, path: text})
+        except InputError:
+            continue
+        same_rows = np.array_equal(other.rows, program.rows) and np.array_equal(other.homeward, program.homeward)
+        assert not same_rows or other.steps != program.steps, (line, changed)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_robot_goes_back_along_its_rows_from_wherever_it_stands_and_from_nowhere_else(form: str) -> None:
+    job, escape, rng = job_in(form), ESCAPES[form], np.random.default_rng(7)
+    name = job.frame.robots[1]
+    program = escape_of(job, name)
+    files, placed = escape.render(program), job.frame.robot(name)
+    numbers, home = to_numbers(placed, program.rows, decimals=5), to_numbers(placed, program.homeward, decimals=5)
+    for step in program.steps:
+        for _ in range(10):
+            row = int(rng.integers(step.first, step.last))  # from 1, so that its next one is row + 1
+            here = numbers[row - 1] + rng.uniform() * (numbers[row] - numbers[row - 1])
+            moves = _moves(Robot(files, step.number, here))
+            begin, end = step.legs[0] or (1, 0)
+            expected = [*numbers[step.first - 1 : row][::-1], *home[begin - 1 : end]]
+            np.testing.assert_allclose(np.array(moves), np.array(expected), atol=1e-4)
+            aside = np.linalg.norm(numbers[row] - numbers[row - 1])
+            off = here + 0.1 * aside * np.where(
+                np.abs(numbers[row] - numbers[row - 1]) > 1e-6, [1, -1, 1, -1, 1, -1], 1
+            )
+            if min(_distance(off, a, b) for a, b in pairwise(numbers)) > 0.11:
+                assert _moves(Robot(files, step.number, off)) == ["halt"]
+    assert _moves(Robot(files, 0, numbers[0])) == ["halt"]
+
+
+def _moves(robot: Robot) -> list[object]:
+    """Where a robot goes when all that it waits for comes."""
+    moves: list[object] = []
+    while robot.event is not None and not robot.is_halted:
+        moves += [robot.event[1]] if robot.event[0] == "move" else []
+        robot.take()
+    return [*moves, "halt"] if robot.is_halted else moves
+
+
+def _distance(p: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
+    share = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0.0, 1.0)
+    return float(np.linalg.norm(p - a - share * (b - a)))
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_robots_go_only_where_all_registers_have_even_or_all_odd_numbers(count: int) -> None:
+    cell = cell_of(*(controlled(name, arm_model()) for name in ("alpha", "beta", "gamma")[:count]), kind="kuka")
+    names = [robot.name for robot in cell.robots]
+    frame = ExportFrame(cell=cell, robots=tuple(names), programs=(None,), promise=Promise.SEQUENCE_ONLY)
+    here = np.zeros((2, 6))
+    here[1] = 0.1
+    steps = tuple(EscapeStep(number, 1, 2, "0.1000", ((2, 2),)) for number in (1, 2))
+    files = {}
+    for name in names:
+        program = EscapeProgram(frame=frame, robot=name, notes=(), rows=here, homeward=here, steps=steps)
+        files[name] = ESCAPES["krl"].render(program)
+    wires: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for robot in cell.robots:
+        assert robot.control is not None
+        assert robot.control.handshake is not None
+        wires[robot.name, str(robot.control.handshake.output)] = [
+            (other.name, str(other.control.handshake.inputs[robot.name]))
+            for other in cell.robots
+            if other.control and other.control.handshake and robot.name in other.control.handshake.inputs
+        ]
+    stands = to_numbers(cell.robots[0], here, decimals=5)[1]
+    for seed in range(40 // count**2):
+        rng = np.random.default_rng(seed)
+        for numbers in product((1, 2), repeat=count):
+            spread = (0.0, 0.02, 1.0, 3.0)[seed % 4]
+            robots = {
+                name: Robot(files[name], number, stands, float(rng.uniform(0.0, spread)))
+                for name, number in zip(names, numbers, strict=True)
+            }
+            play(robots, wires, rng)
+            if len(set(numbers)) == 1:
+                assert all(robot.is_done and robot.moved for robot in robots.values()), (seed, numbers)
+            else:
+                assert not any(robot.moved for robot in robots.values()), (seed, numbers)
+
+
+def test_a_register_may_have_another_name_and_none_that_the_language_has() -> None:
+    job = job_in("krl")
+    robots = tuple(
+        replace(robot, control=robot.control.model_copy(update={"step_register": register}))
+        for robot, register in zip(job.frame.cell.robots, ("N_STEP", "SWITCH"), strict=True)
+        if robot.control is not None
+    )
+    frame = replace(job.frame, cell=replace(job.frame.cell, robots=robots))
+    dialect = with_register(DIALECTS["krl"], ESCAPES["krl"])
+
+    assert "\nN_STEP=3\r" in dialect.render(replace(job, frame=frame))[f"{frame.robots[0]}.src"]
+    (refusal,) = refusals(*dialect.demands(frame, 0))
+    assert "beta.controller.step_register: expected a name of at most 24 characters, got 'SWITCH'" in str(refusal)
