@@ -3,12 +3,12 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from cellplan.cache import without_cache
-from cellplan.errors import NotVerifiedError
+from cellplan.errors import InputError, NotVerifiedError
 from cellplan.files.input.files import digest
 from cellplan.files.input.findings import listed
 from cellplan.geometry.transforms import Array
@@ -17,11 +17,10 @@ from cellplan.jobs.recover.recover import Recovery, recover
 from cellplan.jobs.recover.state import RunPlaces
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.exported import ProgramRows, Promise
-from cellplan.model.report.report import CAUTION
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.dialects import ESCAPES
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.escapes import EscapeForm, EscapeProgram, EscapeStep, read_escape
+from cellplan.programs.elements.escapes import EscapeForm, EscapeProgram, EscapeStep, read_escape, require_same
 from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.joints import Angle, exact_numbers
 from cellplan.programs.elements.text import comment
@@ -30,14 +29,14 @@ from cellplan.programs.export.notes import READ_BACK
 from cellplan.programs.export.prepare import PreparedExport, prepare
 from cellplan.programs.export.program import exporter_of, write_export
 from cellplan.programs.export.record import Record, export_record
+from cellplan.programs.export.stored import StoredExport, refuse_other_run
+from cellplan.programs.export.verify_export import VerifiedExport
 from cellplan.programs.export.written import read_files, write
 from cellplan.programs.promises.orders import Orders
 from cellplan.programs.promises.promises import waits
 from cellplan.programs.rows.margins import corner_vectors
 from cellplan.programs.shared import Shared
-from cellplan.runs.write_run import versions
 
-SCHEMA: Final = "cellplan.escape/1"
 OFF: Final = 0.1  # [deg] or [mm] that a robot may stand off its rows, beside what rounding puts it off
 OFF_RADIANS: Final = 0.0017  # [rad] the same
 ROUNDED_OFF: Final = 1.03  # [-] rounding of zones to sizes that are written
@@ -112,7 +111,7 @@ def escape_programs(
         raise NotVerifiedError([f"{form}: escape: {finding}" for finding in findings])
     joined = {path: text for of_robot in files.values() for path, text in of_robot.items()}
     record = export_record(run, prepared, written)
-    about = _record(run, form, programs, routes, orders, joined)
+    digests = {path: digest(text.encode()) for path, text in joined.items()}
     return WrittenEscape(
         files=written.files,
         record=record,
@@ -120,8 +119,24 @@ def escape_programs(
         routes=routes,
         programs=programs,
         escape_files=joined,
-        escape_record=about,
+        escape_record={**record, "escape": _about(run, programs, routes, orders), "files": digests},
     )
+
+
+def verify_escape(stored: StoredExport, run: VerifiedRun, *, progress: Progress = silent) -> VerifiedExport:
+    """Verify escape programs on disk: they must be those that the run gives, which are judged as they are read.
+
+    Raises:
+        InputError: A file is another one, with its first such line; the programs belong to another run.
+        NotVerifiedError: The programs cannot be written any more.
+    """
+    refuse_other_run(stored, run)
+    again = escape_programs(run, stored.form, stored.choice, progress=progress)
+    for path, text in again.escape_files.items():
+        require_same(str(stored.folder / path), text, stored.files.get(path, ""))
+    if set(stored.files) != set(again.escape_files) or stored.record["escape"] != again.escape_record["escape"]:
+        raise InputError(f"{stored.where}: expected the record of these programs, got another one")
+    return VerifiedExport(record=stored.record, remarks=())
 
 
 def write_escape(folder: Path, escape: WrittenEscape) -> Path:
@@ -134,10 +149,10 @@ def write_escape(folder: Path, escape: WrittenEscape) -> Path:
 
 def escape_lines(record: Record) -> Iterator[str]:
     """The lines of the record of escape programs."""
-    for step in record["steps"]:
+    for step in record["escape"]["steps"]:
         yield f"{step['number']}. {step['phase']}, {step['from_s']:g} to {step['to_s']:g} s: {'; '.join(step['way'])}"
-    if record["by_hand"]:
-        yield f"no format writes that of {listed(record['by_hand'])}: program its steps by hand"
+    if by_hand := record["escape"]["by_hand"]:
+        yield f"no format writes that of {listed(by_hand)}: program its steps by hand"
 
 
 def escape_findings(
@@ -246,15 +261,10 @@ def _notes(run: VerifiedRun, prepared: PreparedExport, robot: str) -> Iterator[s
     yield from head_notes(prepared.job, robot)
 
 
-def _record(
-    run: VerifiedRun,
-    form: str,
-    programs: Mapping[str, EscapeProgram],
-    routes: Sequence[Homeward],
-    orders: Orders,
-    files: Mapping[str, str],
-) -> dict[str, Any]:
-    """What the record says of escape programs."""
+def _about(
+    run: VerifiedRun, programs: Mapping[str, EscapeProgram], routes: Sequence[Homeward], orders: Orders
+) -> Record:
+    """What the record says of escape programs beside what that of the main programs says."""
     steps = [
         {
             "number": route.number,
@@ -267,15 +277,7 @@ def _record(
         for route in routes
     ]
     return {
-        "schema": SCHEMA,
-        "cell": run.cell.name,
-        "format": form,
-        "robots": list(programs),
-        "by_hand": [robot.name for robot in run.cell.robots if not waits(run.cell, robot.name)],
         "registers": {name: program.register for name, program in programs.items()},
+        "by_hand": [robot.name for robot in run.cell.robots if not waits(run.cell, robot.name)],
         "steps": steps,
-        "run": run.digest,
-        "versions": versions(),
-        "files": {path: digest(text.encode()) for path, text in files.items()},
-        "caution": CAUTION,
     }

@@ -198,6 +198,12 @@ def test_programs_are_written_with_their_escapes_and_verified_again(
     cell = str(in_turn.folder.parent / "cell.yaml")
     verify = ["verify", str(tmp_path / "out"), "--run", str(in_turn.folder), "--cell", cell, "-q"]
     assert run_command(verify) == 0
+    of_escape = [verify[0], str(tmp_path / "out-escape"), *verify[2:]]
+    assert run_command(of_escape) == 0
+    limit = tmp_path / "out-escape" / "kuka_esc.src"
+    limit.write_bytes(re.sub(rb"(BACK\(1,\d+),0", rb"\1,9", limit.read_bytes()))
+    assert run_command(of_escape) == 2
+    assert re.search(r"kuka_esc\.src:\d+: expected 'BACK\(1,\d+,0\.\d+\)', got 'BACK\(", capsys.readouterr().err)
     source = tmp_path / "out" / "kuka.src"
     source.write_text(source.read_text(encoding="utf-8").replace("cell_step=2", "cell_step=3"), encoding="utf-8")
     assert run_command(verify) == 2

@@ -89,6 +89,7 @@ def _verified_run(options: VerifyOptions) -> Result:
 
 def _verified_programs(options: VerifyOptions) -> Result:
     """Verify a folder of exported programs against the run that they were made from."""
+    from cellplan.jobs.escape import verify_escape
     from cellplan.programs.export.program import require_format
     from cellplan.programs.export.stored import read_stored_export, refuse_other_run, run_of_export
     from cellplan.programs.export.verify_export import verify_export
@@ -100,7 +101,8 @@ def _verified_programs(options: VerifyOptions) -> Result:
     with progress_listener(quiet=options.quiet) as progress:
         other = partial(refuse_other_run, stored)
         run = open_gate(source, **shared.sources(options), refuse=other, progress=progress)
-        outcome = verify_export(stored, run, progress=progress)
+        judge = verify_escape if "escape" in stored.record else verify_export
+        outcome = judge(stored, run, progress=progress)
     remarks = [*run.remarks, *outcome.remarks]
     lines = [f"{run.cell.name}: programs verified ({stored.form})", f"  run: {source}"]
     lines += [*promise_lines(stored.record), *notes(remarks)]

@@ -217,7 +217,8 @@ def require_same(path: str, expected: str, got: str) -> None:
     """Refuse a text at its first line that is another one."""
     for number, (one, other) in enumerate(zip(expected.split("\n"), [*got.split("\n"), ""], strict=False), start=1):
         if one != other:
-            raise InputError(f"{path}:{number}: expected {one.strip()[:60]!r}, got {other.strip()[:60]!r}")
+            shown = (one, other) if one.strip() == other.strip() else (one.strip(), other.strip())
+            raise InputError(f"{path}:{number}: expected {shown[0][:60]!r}, got {shown[1][:60]!r}")
     if expected != got:
         raise InputError(f"{path}: expected {expected.count(chr(10))} lines, got {got.count(chr(10))}")
 
