@@ -14,10 +14,11 @@ from cellplan.programs.formats.rapid.escape import RAPID_ESCAPE
 from cellplan.programs.formats.rapid.writer import RAPID
 from cellplan.programs.formats.ros2.writer import ROS2
 from cellplan.programs.formats.stream.writer import STREAM
+from cellplan.programs.formats.urscript.escape import URSCRIPT_ESCAPE
 from cellplan.programs.formats.urscript.writer import URSCRIPT
 from cellplan.programs.formats.val3.writer import VAL3
 
 DIALECTS: Final[Mapping[str, Dialect]] = {
     dialect.name: dialect for dialect in (CSV, FANUC_LS, JSON, KRL, RAPID, ROS2, STREAM, URSCRIPT, VAL3)
 }
-ESCAPES: Final[Mapping[str, EscapeForm]] = {"krl": KRL_ESCAPE, "rapid": RAPID_ESCAPE}
+ESCAPES: Final[Mapping[str, EscapeForm]] = {"krl": KRL_ESCAPE, "rapid": RAPID_ESCAPE, "urscript": URSCRIPT_ESCAPE}

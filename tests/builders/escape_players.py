@@ -1,4 +1,4 @@
-"""Escape programs as a controller would run them: KRL and RAPID texts become Python generators of what is done.
+"""Escape programs as a controller would run them: their texts become Python generators of what is done.
 
 Nothing of cellplan reads the texts here. A robot yields ``("move", numbers)``, ``("out", signal, state)``,
 ``("in", signal, state)``, ``("pause",)`` and ``("halt",)``.
@@ -54,6 +54,25 @@ RAPID = (
     (r"cell_step := (\d+);", "M.step = {0}", 0),
     (r"(?:VAR num )?(\w+) := (.*);", "{0} = {1}", 0),
     (r"(\w+) ?(.*);", "yield from {0}(M, {1})", 0),
+)
+URSCRIPT = (
+    (r"#.*|", "pass", 0),
+    (r"def (\w+)\((.*)\):", "def {0}(M, {1}):", 1),
+    (r"end", "", -1),
+    (r"here = get_actual_joint_positions\(\)", "here = M.here()", 0),
+    (r"set_standard_digital_out\((\d+), (True|False)\)", "yield ('out', '{0}', {1})", 0),
+    (r"wait (not )?(\d+)", "yield ('in', '{1}', bool('{0}'))", 0),
+    (r"sleep\(1\.0\)", "yield ('pause',)", 0),
+    (r"movej\((\w+)\(row\), .*\)", "yield ('move', (yield from {0}(M, row)))", 0),
+    (r"halt", "yield ('halt',)", 0),
+    (r"step = read_output_integer_register\(24\)", "step = M.begun", 0),
+    (r"write_output_integer_register\(24, (\d+)\)", "M.step = {0}", 0),
+    (r"(if|while) (.*):", "{0} {1}:", 1),
+    (r"(elif step == \d+|else):", "{0}:", 2),
+    (r"return (.*)", "return {0}", 0),
+    (r"(\w+) = (escape_rows)\((.*)\)", "{0} = yield from {1}(M, {2})", 0),
+    (r"(\w+) = (.*)", "{0} = {1}", 0),
+    (r"(\w+)\((.*)\)", "yield from {0}(M, {1})", 0),
 )
 
 
@@ -142,12 +161,18 @@ def robot_program(files: Mapping[str, str], machine: SimpleNamespace, here: Sequ
     texts = {path.rpartition(".")[2]: text.replace("\r", "") for path, text in files.items()}
     axes = [f"A{axis}" for axis in range(1, 7)] if "src" in texts else [f"rax_{axis}" for axis in range(1, 7)]
     names: dict[str, Any] = {}
+    machine.here = lambda: SimpleNamespace(**dict(zip(axes, here, strict=True)))
     if "src" in texts:
         _translate(texts["src"].split("\n"), KRL, names)
         for table, row, numbers in re.findall(r"(X[RH])\[(\d+)\]=\{(.*)\}", texts["dat"]):
             values = re.findall(r"A\d (-?[\d.]+)", numbers)
             names.setdefault(table, {})[int(row)] = SimpleNamespace(**dict(zip(axes, map(float, values), strict=True)))
         begin = next(name for name in names if name.endswith("_esc"))
+    elif "script" in texts:
+        waits = r"while (not )?get_standard_digital_in\((\d+)\):\n\s*sync\(\)\n\s*end"
+        _translate(re.sub(waits, r"wait \1\2", texts["script"]).split("\n"), URSCRIPT, names)
+        begin = next(name for name in names if name.endswith("_escape"))
+        machine.here = lambda: here
     else:
         code = texts["mod"]
         for table in re.findall(r"LOCAL CONST jointtarget (\w+)\{\d+\} := \[(.*?)\];", code, re.DOTALL):
@@ -162,7 +187,6 @@ def robot_program(files: Mapping[str, str], machine: SimpleNamespace, here: Sequ
         lines = [line for line in plain.split("\n") if not re.fullmatch(r"\s*VAR (?!num at)\w.*;", line)]
         _translate(lines, RAPID, names)
         begin = "cell_escape"
-    machine.here = lambda: SimpleNamespace(**dict(zip(axes, here, strict=True)))
     program: Iterator[Event] = names[begin](machine)
     return program
 

@@ -37,9 +37,9 @@ CHANGES = {
     "three_tasks_each": {
         "    model: kuka_kr16_2\n": "    model: kuka_kr16_2\n"
         "    controller: {id: krc, handshake: {output: 1, inputs: {left: 1, right: 2}}}\n",
-        "  left:\n": "  left:\n    controller: {id: one, " + SIGNALS % ("doOne", "diOne"),
-        "  right:\n": "  right:\n    controller: {id: two, " + SIGNALS % ("doTwo", "diTwo"),
-        "part:\n": "controllers: {krc: {kind: kuka}, one: {kind: abb}, two: {kind: abb}}\npart:\n",
+        "  left:\n": "  left:\n    controller: {id: one, " + SIGNALS % (1, 1),
+        "  right:\n": "  right:\n    controller: {id: two, " + SIGNALS % (2, 2),
+        "part:\n": "controllers: {krc: {kind: kuka}, one: {kind: ur}, two: {kind: ur}}\npart:\n",
         "mode: simultaneous": "mode: part_at_rest",
     },
 }
@@ -81,8 +81,9 @@ def run_of(cell: str, folder: Path) -> VerifiedRun:
 
 
 def escapes_of(run: VerifiedRun, shared: Shared) -> dict[str, WrittenEscape]:
-    """Programs and escape programs in both formats."""
-    return {form: escape_programs(run, form, Choice(), shared=shared) for form in ("krl", "rapid")}
+    """Programs and escape programs in both formats of a cell."""
+    forms = ("krl", "urscript" if any(entry.kind == "ur" for entry in run.cell.controllers.values()) else "rapid")
+    return {form: escape_programs(run, form, Choice(), shared=shared) for form in forms}
 
 
 @pytest.mark.parametrize("cell", ["in_turn", "three"])
@@ -94,7 +95,8 @@ def test_all_robots_come_home_from_random_stops_and_keep_their_distance_by_brute
     escapes = request.getfixturevalue("escapes") if cell == "in_turn" else escapes_of(run, shared)
     places, rng, smallest = RunPlaces.of(run), np.random.default_rng(11), np.inf
     stretches, routes = shared.orders()[0].stretches, next(iter(escapes.values())).routes
-    programs = {name: (escape, program) for escape in escapes.values() for name, program in escape.programs.items()}
+    programs = {name: (form, program) for form, one in escapes.items() for name, program in one.programs.items()}
+    angles = {name: ESCAPES[form].angle for name, (form, _) in programs.items()}
     assert set(programs) == {robot.name for robot in run.cell.robots}
     for route, stretch in zip(routes, stretches, strict=True):
         back = BruteForce(places.scene_of_phase(places.at(0.5 * sum(_times(run, stretch)))))
@@ -103,19 +105,20 @@ def test_all_robots_come_home_from_random_stops_and_keep_their_distance_by_brute
         near = {pair.names: pair.begin - pair.slack for pair, _ in route.recovery.judgement.apart}
         for _ in range(STOPS):
             robots = {}
-            for name, (escape, program) in programs.items():
+            for name, (form, program) in programs.items():
                 step = program.steps[route.number - 1]
                 row = int(rng.integers(step.first, step.last))
                 q = program.rows[row - 1] + rng.uniform() * (program.rows[row] - program.rows[row - 1])
-                files = {p: t for p, t in escape.escape_files.items() if p.startswith(name)}
-                here = exact_numbers(run.cell.robot(name), q[None])[0]
+                files = {p: t for p, t in escapes[form].escape_files.items() if p.startswith(name)}
+                here = exact_numbers(run.cell.robot(name), q[None], angle=angles[name])[0]
                 robots[name] = Robot(files, route.number, here, float(rng.uniform(0.0, 2.0)))
 
             def seen(robots=robots, back=back, home=home, near=near, number=route.number) -> None:
                 nonlocal smallest
                 if rng.uniform() > 0.02:
                     return
-                q = np.concatenate([from_numbers(run.cell.robot(n), robots[n].q[None])[0] for n in robots])
+                shown = ((robot, robots[robot.name].q[None], angles[robot.name]) for robot in run.cell.robots)
+                q = np.concatenate([from_numbers(robot, it, angle=angle)[0] for robot, it, angle in shown])
                 begun = any(robot.machine.step == 0 for robot in robots.values())
                 for names, (distance, demand) in (home if begun else back).near(q, 0.02).items():
                     least = min(near.get(names, demand), demand) if begun else demand
@@ -126,7 +129,7 @@ def test_all_robots_come_home_from_random_stops_and_keep_their_distance_by_brute
             assert all(robot.is_done for robot in robots.values())
             end = recovery_rows(route.recovery.phases)[-1]
             for name, robot in robots.items():
-                q = from_numbers(run.cell.robot(name), robot.q[None])[0]
+                q = from_numbers(run.cell.robot(name), robot.q[None], angle=angles[name])[0]
                 np.testing.assert_allclose(q, end[run.cell.columns(name)], atol=2e-4)
     assert smallest < 0.02  # something was measured
 
@@ -221,5 +224,5 @@ def test_a_mark_without_a_way_home_is_named_with_its_phase_and_pair(in_turn: Ver
 
 
 def test_formats_without_escape_programs_are_refused(in_turn: VerifiedRun) -> None:
-    with pytest.raises(InputError, match=r"^--escape: expected one of the formats krl, rapid, got csv"):
+    with pytest.raises(InputError, match=r"^--escape: expected one of the formats krl, rapid, urscript, got csv"):
         escape_programs(in_turn, "csv", Choice())

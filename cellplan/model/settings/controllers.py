@@ -189,7 +189,7 @@ class RobotControlEntry(Entry):
     step_register: Signal | None = Field(
         default=None,
         description="Variable, or number of the register, in which its program keeps the step that an escape program "
-        "begins from; cell_step when absent.",
+        "begins from; cell_step, or register 24 of kind ur, when absent.",
     )
 
     @model_validator(mode="before")

@@ -25,6 +25,7 @@ from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps,
 from cellplan.programs.elements.joints import Angle, from_numbers
 
 REGISTER: Final = "cell_step"  # name of a step register where the cell states none
+NUMBERED: Final = {"ur": "24"}  # by kind of controller, its number where registers have no names
 SPEED: Final = 10  # [%] of the top speed
 
 
@@ -112,7 +113,9 @@ def agreement_steps(frame: ExportFrame, robot: str, *, is_odd: bool) -> list[Han
 def register_of(frame: ExportFrame, robot: str) -> str:
     """Name or number of the step register of a robot."""
     control = frame.robot(robot).control
-    return REGISTER if control is None or control.step_register is None else str(control.step_register)
+    if control is not None and control.step_register is not None:
+        return str(control.step_register)
+    return REGISTER if control is None else NUMBERED.get(frame.cell.controllers[control.id].kind, REGISTER)
 
 
 def with_register(dialect: Dialect, form: EscapeForm) -> Dialect:

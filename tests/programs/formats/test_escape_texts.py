@@ -13,22 +13,39 @@ from builders.scene_builders import arm_model
 
 from cellplan.errors import InputError, refusals
 from cellplan.model.report.exported import ExportFrame, ExportJob, Promise
+from cellplan.model.settings.controllers import HandshakeEntry
 from cellplan.programs.dialects import DIALECTS, ESCAPES
 from cellplan.programs.elements.escapes import EscapeProgram, EscapeStep, read_escape, with_register
 from cellplan.programs.elements.joints import from_numbers, to_numbers
 
-FORMS = ("krl", "rapid")
+FORMS = ("krl", "rapid", "urscript")
 
 
 def job_in(form: str) -> ExportJob:
     """A program of two robots that meet at three marks."""
-    return two_arms("kuka", seed=3) if form == "krl" else sequence_job(seed=3)
+    if form != "urscript":
+        return two_arms("kuka", seed=3) if form == "krl" else sequence_job(seed=3)
+    job = two_arms("ur", seed=3)
+    wires = {"alpha": (1, {"beta": 2}), "beta": (3, {"alpha": 4})}
+    signals = {name: HandshakeEntry(output=output, inputs=inputs) for name, (output, inputs) in wires.items()}
+    robots = tuple(
+        replace(robot, control=robot.control.model_copy(update={"handshake": signals[robot.name]}))
+        for robot in job.frame.cell.robots
+        if robot.control is not None
+    )
+    return replace(job, frame=replace(job.frame, cell=replace(job.frame.cell, robots=robots)))
 
 
-def escape_of(job: ExportJob, robot: str) -> EscapeProgram:
+def numbers_of(form: str, job: ExportJob, robot: str, q: np.ndarray) -> np.ndarray:
+    """Positions as the controller shows them, with the decimals of the format."""
+    angle, decimals = ESCAPES[form].angle, 9 if form == "urscript" else 4
+    return to_numbers(job.frame.robot(robot), q, decimals=decimals, angle=angle)
+
+
+def escape_of(form: str, job: ExportJob, robot: str) -> EscapeProgram:
     """Ways home that lead from each mark over three rows, in two legs, in the second of which it stands."""
     rows = job.programs[0].robots[robot]
-    q = from_numbers(job.frame.robot(robot), to_numbers(job.frame.robot(robot), rows.q, decimals=4))
+    q = from_numbers(job.frame.robot(robot), numbers_of(form, job, robot, rows.q), angle=ESCAPES[form].angle)
     pairs = zip(rows.marks[:-1], rows.marks[1:], strict=True)
     steps = tuple(
         EscapeStep(number, first + 1, last + 1, "0.1000", ((3 * number - 1, 3 * number + 1), None))
@@ -46,7 +63,7 @@ def test_programs_set_their_register_at_each_mark_and_are_read_with_these_number
     (read,) = dialect.read(job.frame, files)
     (expected,) = plain.read(job.frame, plain.render(job))
 
-    setting = re.compile(r"^ *cell_step ?:?= ?(\d);?\r?\n", re.MULTILINE)
+    setting = re.compile(r"^ *(?:cell_step ?:?= ?|write_output_integer_register\(24, )(\d)[;)]?\r?\n", re.MULTILINE)
     for name, rows in expected.robots.items():
         np.testing.assert_array_equal(read.robots[name].q, rows.q)
         assert read.robots[name].marks == rows.marks
@@ -55,7 +72,7 @@ def test_programs_set_their_register_at_each_mark_and_are_read_with_these_number
         assert numbers in ([], ["0", "1", "2", "3"])
         for match in setting.finditer(text):
             lines = match[0]
-            other = f"{lines[: lines.index(match[1])]}7{lines[lines.index(match[1]) + 1 :]}"
+            other = re.sub(rf"{match[1]}(?=\D*$)", "7", lines)
             for changed in ("", other, lines + lines):
                 with pytest.raises(InputError, match=rf"^{path}:\d+: expected '"):
                     dialect.read(job.frame, {**files, path: text[: match.start()] + changed + text[match.end() :]})
@@ -65,7 +82,7 @@ def test_programs_set_their_register_at_each_mark_and_are_read_with_these_number
 def test_escape_programs_are_read_back_and_every_change_is_noticed(form: str) -> None:
     job, escape, rng = job_in(form), ESCAPES[form], np.random.default_rng(5)
     name = job.frame.robots[1]
-    program = escape_of(job, name)
+    program = escape_of(form, job, name)
     files = escape.render(program)
     read = read_escape(escape, program, files)
 
@@ -97,9 +114,9 @@ def test_escape_programs_are_read_back_and_every_change_is_noticed(form: str) ->
 def test_a_robot_goes_back_along_its_rows_from_wherever_it_stands_and_from_nowhere_else(form: str) -> None:
     job, escape, rng = job_in(form), ESCAPES[form], np.random.default_rng(7)
     name = job.frame.robots[1]
-    program = escape_of(job, name)
-    files, placed = escape.render(program), job.frame.robot(name)
-    numbers, home = to_numbers(placed, program.rows, decimals=5), to_numbers(placed, program.homeward, decimals=5)
+    program = escape_of(form, job, name)
+    files = escape.render(program)
+    numbers, home = (numbers_of(form, job, name, q) for q in (program.rows, program.homeward))
     for step in program.steps:
         for _ in range(10):
             row = int(rng.integers(step.first, step.last))  # from 1, so that its next one is row + 1
