@@ -52,6 +52,7 @@ class Dialect:
     split: int | None = None  # most rows of a file or routine; None for no limit
     shortest_time: float = 0.0  # shortest time in [s] between two rows that targets are known to keep; 0 for no limit
     is_proved: bool = False  # whether that time is documented by the maker, not only known from practice
+    has_part_targets: bool = False  # whether rows can be poses of tools on the part while robots move in step
     moves: tuple[Moves, ...] = (Moves.JOINTS,)  # how its programs can move tools where they work
     # configuration of arms as its targets state it, for joints in [rad] or [m], shape (N, n) to (N, k); an
     # ``InputError`` for an arm that has none. None where targets state none.

@@ -179,6 +179,8 @@ def _broken_skew(skew: RunSkew | None, pair: ClockPair) -> str:
 def _against_synchronised(export: _Export) -> _Against | None:
     """Why the robots do not pass the same rows at the same time."""
     cell, robots = export.run.cell, export.robots
+    if export.moves is Moves.LINEAR and not export.dialect.has_part_targets:
+        return _Against(f"{export.dialect.name} moves tools by joints where robots move in step")
     if len(robots) < 2:
         return _Against(f"it takes two robots on one controller, and only '{robots[0]}' is exported")
     names = list(dict.fromkeys(controllers_of(cell, robots).values()))

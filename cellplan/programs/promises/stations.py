@@ -1,7 +1,8 @@
 """Stations: the part as controllers have to know it, in every pose in which tools work on it.
 
 A part that stands still while a tool works has a fixed frame in each of its poses; one that a robot of the same
-controller holds has a frame that goes with the flange of this robot, whether it moves or not.
+controller holds has a frame that goes with the flange of this robot, whether it moves or not, but on controllers for
+which only fixed frames are written.
 """
 
 from collections.abc import Sequence
@@ -21,6 +22,7 @@ from cellplan.programs.promises.run_programs import run_programs
 from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
+FIXED: Final = frozenset({"fanuc"})  # kinds for which no frame is written that another robot moves
 SAME_TOL: Final = 1e-6  # [m] and [rad] within which poses of a part are one
 
 
@@ -49,13 +51,21 @@ def _station(cell: Cell, task: Task, q: Array) -> Station:
         X_W = part.X_CP if task.relative_to is Frame.PART else np.eye(4)
         return Station(tasks=(task.name,), X=inverse(controller_base(robot)) @ X_W, X_W=X_W)
     holder = cell.robot(part.held_by[0].robot)
-    if robot.control is not None and holder.control is not None and robot.control.id == holder.control.id:
+    if _has_frame_on(cell, holder, robot):
         return Station(tasks=(task.name,), holder=holder.name, X=on_flange(holder, holder.tool.X_FT @ part.X_CP))
     X_WP = ScrewChain(holder).tool_poses(q[:, cell.columns(holder.name)]) @ part.X_CP
     farthest = np.argmax(np.abs(X_WP - X_WP[0]).max(axis=(1, 2)))
     if not _is_same(X_WP[0], X_WP[farthest]):
         return Station(tasks=(task.name,))
     return Station(tasks=(task.name,), X=inverse(controller_base(robot)) @ X_WP[0], X_W=X_WP[0])
+
+
+def _has_frame_on(cell: Cell, holder: Robot, robot: Robot) -> bool:
+    """Whether the controller of a robot moves a frame of the part with the robot that holds it."""
+    if holder.control is None or robot.control is None or holder.control.id != robot.control.id:
+        return False
+    controller = cell.controllers.get(robot.control.id)
+    return controller is None or controller.kind not in FIXED
 
 
 def _join(known: list[Station], other: Station) -> None:

@@ -9,7 +9,7 @@ from builders.commands import run_command
 
 from cellplan import VerifiedRun, open_gate
 from cellplan.errors import InputError, NotVerifiedError
-from cellplan.model.report.exported import Promise
+from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import ACCESS_TOKEN
 from cellplan.model.settings.controllers import ControllerEntry, KindName, RobotControlEntry
 from cellplan.model.task.task import Service
@@ -94,6 +94,17 @@ def test_two_robots_of_one_controller_are_synchronised(run: VerifiedRun) -> None
     assert promise.reasons == ("not timed: in-step programs cannot state it",)
 
 
+def test_tools_are_moved_on_lines_in_step_only_where_a_format_has_targets_on_the_part(run: VerifiedRun) -> None:
+    both = on_controllers(run, controllers("c", "d"), left="c", right="c", idle="d")
+    on_lines = replace(IN_STEP, moves=tuple(Moves))
+
+    with pytest.raises(NotVerifiedError) as refusal:
+        choose_promise(both, on_lines, ("left", "right"), moves=Moves.LINEAR)
+    assert "not synchronised: in-step moves tools by joints where robots move in step" in str(refusal.value)
+    for dialect, moves in ((replace(on_lines, has_part_targets=True), Moves.LINEAR), (on_lines, Moves.AUTO)):
+        assert choose_promise(both, dialect, ("left", "right"), moves=moves).promise is Promise.SYNCHRONISED
+
+
 def test_programs_without_times_say_that_they_do_not_wait_while_a_tool_is_cleaned(run: VerifiedRun) -> None:
     one = on_controllers(run, controllers("c"), left="c", right="c", idle="c")
     service = Service(posture=np.zeros(6), takes=8.0, most=1)
@@ -172,7 +183,7 @@ def test_choices_that_a_format_cannot_keep_are_refused(choice: dict[str, float],
     [
         ("--format krl --thin-mm 0", "--thin-mm: expected a positive number, got 0"),
         ("--format csv --split 20", "--split: expected no --split with csv, whose files have no limit"),
-        ("--format krl --moves linear", "--moves: expected joints with krl, got linear"),
+        ("--format csv --moves linear", "--moves: expected joints with csv, got linear"),
         ("--format wide --robot left", "--format: expected no choice of robots, rows or targets with wide, a table of"),
     ],
 )

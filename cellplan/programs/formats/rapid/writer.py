@@ -288,6 +288,7 @@ RAPID: Final = Dialect(
     is_rounded=True,
     split=LINES,
     demands=_demands,
+    has_part_targets=True,
     moves=tuple(Moves),
     configuration=configuration,
 )
