@@ -21,6 +21,7 @@ ROUNDING_TOL: Final = 1e-9  # [rad] or [m] arithmetic of units and zeros
 QUANTA: Final = 2.01  # [-] of the last decimal of a degree or millimetre: two axes that are coupled round by one each
 SHARE_TOL: Final = 0.02  # [-] zones are sizes, of segments between rows that are rounded; what is read is judged
 FEED_TOL: Final = 1e-6  # [m/s]
+SEAM_PLACE: Final = 1e-5  # [mm] languages of radians state places in metres
 SEAM_TURN: Final = 1e-2  # [deg] rounding of three angles, of which pendants hold two or three decimals
 SOLVED_TOL: Final = 1e-4  # [rad] or [m] positions that are worked out again from poses of tools
 
@@ -69,7 +70,7 @@ def _other_seam(dialect: Dialect, job: ExportJob, written: RobotRows, read: Robo
     decimals = decimals_of(job.frame.robot(written.robot), dialect.decimals)
     for seam in written.seams:
         for row in range(seam.first + 1, seam.last + 1):
-            finding = _other_move(written, read, row, quantum=QUANTA * 10.0**-decimals)
+            finding = _other_move(written, read, row, quantum=max(QUANTA * 10.0**-decimals, SEAM_PLACE))
             if finding is not None:
                 return f"row {row + 1}, task '{seam.task}': {finding}"
     return None

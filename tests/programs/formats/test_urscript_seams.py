@@ -1,16 +1,19 @@
 """URScript with seams: what is written is read back as it was, and every change of a file is noticed."""
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from builders.elbow_arm import tip
-from builders.seam_jobs import ROBOT, SEAM, UR_VALVE, run_of, seam_job
+from builders.seam_jobs import KUKA_ZERO, ROBOT, SEAM, UR_VALVE, run_of, seam_job
 
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.geometry.transforms import pose_from, rotation_exp
 from cellplan.model.report.exported import ExportJob
+from cellplan.model.settings.controllers import KindName
+from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.formats.urscript.writer import URSCRIPT
 from cellplan.programs.judgement.compare_rows import other_rows
 from cellplan.programs.seams.executed import executed_programs
@@ -105,7 +108,7 @@ CHANGES: dict[str, tuple[str, str, str]] = {  # what is replaced once, what by, 
     "blend beside a seam": ("movej(j_2, a=20.000, v=2.304", "movej(j_2, a=20.000, v=2.304, r=0.0100", "a stop beside"),
     "on and off exchanged": ("set_digital_out(3,True)", "set_digital_out(3,False)", "expected"),
     "never on": ("    set_digital_out(3,True)\n    sleep(0.300)\n", "", "a process that is on before"),
-    "never off": ("    sleep(0.200)\n    set_digital_out(3,False)\n", "", "a process that goes off before the end"),
+    "never off": ("    sleep(0.200)\n    set_digital_out(3,False)\n", "", "as a stop ends its process"),
     "other output": ("set_digital_out(3,True)", "set_digital_out(4,True)", "a statement that these programs have"),
     "no delay": ("    sleep(0.300)\n", "", "as the cell states them"),
     "halt": ("    sleep(0.300)\n", "    sleep(0.300)\n    halt\n", "a statement that these programs have"),
@@ -137,3 +140,19 @@ def test_changes_of_a_file_are_noticed(name: str) -> None:
 
     assert said
     assert words in said
+
+
+@pytest.mark.parametrize(("form", "kind"), [("krl", "kuka"), ("val3", "staubli"), ("urscript", "ur")])
+def test_places_and_speeds_that_no_decimal_meets_come_back(form: str, kind: KindName) -> None:
+    rng, dialect = np.random.default_rng(1), DIALECTS[form]
+    for _ in range(5):
+        job = seam_job(kind, controller=KUKA_ZERO)
+        rows = job.programs[0].robots[ROBOT]
+        assert rows.X_PT is not None
+        assert rows.feeds is not None
+        X_PT = rows.X_PT.copy()
+        X_PT[2:7, :3, 3] += rng.uniform(-1e-4, 1e-4, (5, 3))
+        changed = replace(rows, X_PT=X_PT, feeds=rows.feeds * rng.uniform(0.5, 1.0))
+        job = replace(job, programs=(replace(job.programs[0], robots={ROBOT: changed}),))
+
+        assert list(other_rows(dialect, job, dialect.read(job.frame, dialect.render(job)))) == []
