@@ -132,7 +132,8 @@ def refuse_unfit(run: ReadRun | UnsolvedRun, dialect: Dialect, choice: Choice) -
         robots = exported_robots(run.cell, dialect, choice.robots)
     elif not robots:  # or else what those need that have no controller yet is said too
         raise_findings(unmet)
-    best = promise = choice.promise or dialect.promises[0]
+    usual = dialect.promises[0 if dialect.most_arms is None else -1]  # arms of controllers that are not known yet
+    best = promise = choice.promise or usual
     try:
         best = choose_promise(run, dialect, robots, requested=choice.promise, moves=choice.moves).promise
     except InputError as error:
