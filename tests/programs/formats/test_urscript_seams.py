@@ -80,10 +80,10 @@ def noticed(job: ExportJob, text: str) -> str:
 
 
 CHANGES: dict[str, tuple[str, str, str]] = {  # what is replaced once, what by, and what is said
-    "other feed": ("v=0.008000, r=0.0107", "v=0.009000, r=0.0107", "expected a speed of 8 mm/s, read 9 mm/s"),
+    "other feed": ("v=0.008000, r=0.010770", "v=0.009000, r=0.010770", "expected a speed of 8 mm/s, read 9 mm/s"),
     "feed in millimetres": ("v=0.008000", "v=8.000000", "expected a speed of 8 mm/s, read 8000 mm/s"),
     "no feed": ("v=0.008000", "v=0.000000", "a speed above 0"),
-    "feed by a time": ("v=0.008000, r=0.0107", "t=1.0, r=0.0107", "a statement that these programs have"),
+    "feed by a time": ("v=0.008000, r=0.010770", "t=1.0, r=0.010770", "a statement that these programs have"),
     "other acceleration": ("a=1.200, v=0.05", "a=2.200, v=0.05", "expected a=1.200"),
     "other tool": ("set_tcp(p[0.000000000", "set_tcp(p[0.000200000", "expected set_tcp(p[0.000000000"),
     "no tool": ("  set_tcp(p", "  # set_tcp(p", "expected set_tcp("),
@@ -103,8 +103,8 @@ CHANGES: dict[str, tuple[str, str, str]] = {  # what is replaced once, what by, 
     ),
     "arc of another mode": ("mode=0", "mode=1", "a statement that these programs have"),
     "joints to a pose": ("movej(j_2,", "movej(seam_1,", "used once"),
-    "process blended": ("v=0.050000, r=0.0000", "v=0.050000, r=0.0050", "a stop where a process goes on or off"),
-    "larger blend": ("r=0.0107", "r=0.0120", "expected rounding of at most 0.2"),
+    "process blended": ("v=0.050000, r=0.000000", "v=0.050000, r=0.005000", "a stop where a process goes on or off"),
+    "larger blend": ("r=0.010770", "r=0.012000", "expected rounding of at most 0.2"),
     "blend beside a seam": ("movej(j_2, a=20.000, v=2.304", "movej(j_2, a=20.000, v=2.304, r=0.0100", "a stop beside"),
     "on and off exchanged": ("set_digital_out(3,True)", "set_digital_out(3,False)", "expected"),
     "never on": ("    set_digital_out(3,True)\n    sleep(0.300)\n", "", "a process that is on before"),

@@ -126,7 +126,7 @@ DATA: dict[str, tuple[str, str, str]] = {
     "tool off": ('x="0.00000" y="20.00000"', 'x="0.20000" y="20.00000"', "expected tTool as the cell has it"),
     "tool turned": ('rx="5.61611"', 'rx="-5.61611"', "expected tTool as the cell has it"),
     "joints off": ('j1="-25.15427"', 'j1="-25.05427"', "expected joint a1"),
-    "larger zone": ('leave="10.77"', 'leave="12.00"', "expected rounding of at most 0.2"),
+    "larger zone": ('leave="10.770"', 'leave="12.000"', "expected rounding of at most 0.2"),
     "blend of joints": ('blend="Cartesian"', 'blend="joint"', "a blend Cartesian"),
     "other link": ('link="doArc"', 'link="doFire"', "expected the link doArc"),
     "configuration": (

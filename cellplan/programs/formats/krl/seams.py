@@ -27,7 +27,7 @@ MODES: Final = ("$IPO_MODE=#BASE", "$ORI_TYPE=#VAR", "$CIRC_TYPE=#BASE")  # no t
 TOOL: Final = "TOOL_FRAME"
 PART: Final = "PART_FRAME_"  # and the number of the station, from 1
 SPEED_DECIMALS: Final = 6  # of a metre in a second
-ZONE_DECIMALS: Final = 2  # of a millimetre
+ZONE_DECIMALS: Final = 3  # of a millimetre
 WAIT_DECIMALS: Final = 3
 
 

@@ -37,7 +37,7 @@ from cellplan.programs.formats.zones import shares_off_seams, tool_zones
 
 TOOL_ACCELERATION: Final = 1.2  # [m/s^2] of lines and arcs: that of the language
 SPEED_DECIMALS: Final = 6  # of a metre in a second
-RADIUS_DECIMALS: Final = 4  # of a metre
+RADIUS_DECIMALS: Final = 6  # of a metre
 POSE_DECIMALS: Final = 9  # of a metre and of a radian
 UR: Final = CONVENTIONS["ur"]
 PART: Final = "part_"  # and the number of the station, from 1

@@ -45,8 +45,8 @@ from cellplan.programs.formats.zones import shares_off_seams, tool_zones
 
 NO_LIMIT: Final = "99999"  # [mm/s] and [deg/s] of the tool: the axes are what limits
 SPEED_DECIMALS: Final = 3  # of a millimetre in a second
-ZONE_DECIMALS: Final = 2  # of a millimetre
-SMALLEST_ZONE: Final = 0.05  # [mm] a smaller zone is a stop
+ZONE_DECIMALS: Final = 3  # of a millimetre
+SMALLEST_ZONE: Final = 0.05  # [mm] a smaller zone of joints is a stop; on a seam a stop would end the process
 STAND: Final = "waitEndMove()"  # before signals, which would be set while the robot moves
 STAUBLI: Final = CONVENTIONS["staubli"]
 
@@ -201,7 +201,7 @@ class SeamWriter:
     def _descriptor(self, speed: Mapping[str, str], zone: float, blend: str) -> int:
         """Place of a motion descriptor with a speed, and a zone in [mm]."""
         size = floor(zone * 10**ZONE_DECIMALS) / 10**ZONE_DECIMALS
-        is_rounded = size >= SMALLEST_ZONE
+        is_rounded = size >= SMALLEST_ZONE or (blend == "Cartesian" and size > 0.0)
         text = fixed(size, ZONE_DECIMALS) if is_rounded else "0"
         values = {"accel": "100", **speed, "decel": "100", "rmax": NO_LIMIT}
         values |= {"blend": blend if is_rounded else "off", "leave": text, "reach": text}
