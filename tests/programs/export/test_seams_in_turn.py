@@ -32,3 +32,55 @@ def test_seams_of_two_makers_are_written_and_verified(tmp_path: Path) -> None:
     status, out, error = run_command("cellplan verify krl --run run --cell cell.yaml -q", tmp_path)
     assert status != 0
     assert "0.2 mm" in out + error or "kuka.dat" in out + error
+
+
+BEAD = Path(__file__).resolve().parents[3] / "examples" / "seams" / "bead.yaml"
+ROBOTS = {  # model, home, what its controller counts from, and how it begins and ends a process
+    "krl": (
+        "kuka_kr16_2",
+        "[0, -90, 90, 0, 60, 0]",
+        "{id: box, tool_number: 2, base: {xyz_mm: [0, 0, 100], rpy_deg: [0, 0, 90]}}",
+        "{kind: kuka, process: {on: '$OUT[7]=TRUE', off: '$OUT[7]=FALSE'}}",
+    ),
+    "urscript": (
+        "ur10e",
+        "[180, -90, 90, -90, -90, 0]",
+        "{id: box, base: {rpy_deg: [0, 0, 180]}}",
+        "{kind: ur, process: {on: 'glue({data})', off: 'glue(0)', data: {ring: '1', corner: '2'}}}",
+    ),
+}
+CHANGES = {
+    "krl": ("arm.src", [("$VEL.CP=0.04", "$VEL.CP=0.05"), ("TOOL_DATA[2]", "TOOL_DATA[1]"), ("7]=TRUE", "7]=FALSE")]),
+    "urscript": ("arm.script", [("glue(1)", "glue(2)"), ("part_1 = p[-0.75", "part_1 = p[0.75"), ("v=0.04", "v=0.05")]),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ROBOTS)
+def test_a_bead_is_written_for_other_makers(form: str, tmp_path: Path) -> None:
+    """An arm without a spherical wrist, and controllers that count from a base of their own."""
+    model, home, control, controller = ROBOTS[form]
+    tool = "{mass_kg: 1, rod: {length_mm: 250, tilt_deg: 35, radius_mm: 10, stick_out_mm: 15}}"
+    robot = f"robots: {{arm: {{model: {model}, tool: {tool}, home_deg: {home}, controller: {control}}}}}\n"
+    head, _, rest = BEAD.read_text(encoding="utf-8").partition("robots:\n")
+    part = (
+        rest[rest.index("part:") :]
+        .replace("[1000, 0, 300]", "[750, 0, 150]")
+        .replace("[500, 400, 60]", "[300, 300, 60]")
+    )
+    for far, near in (("[-200, -150,", "[-100, -100,"), ("[200, -150,", "[100, -100,"), ("[200, 150,", "[100, 100,")):
+        part = part.replace(far, near)
+    (tmp_path / "cell.yaml").write_text(f"{head}{robot}controllers: {{box: {controller}}}\n{part}", encoding="utf-8")
+    assert run_command("cellplan solve cell.yaml -o run -q", tmp_path)[0] == 0
+
+    status, out, _ = run_command(f"cellplan export run --cell cell.yaml --format {form} --moves linear -o p", tmp_path)
+
+    assert (status, "  promise: paced" in out) == (0, True)
+    verify = "cellplan verify p --run run --cell cell.yaml -q"
+    assert run_command(verify, tmp_path)[0] == 0
+    name, changes = CHANGES[form]
+    text = (tmp_path / "p" / name).read_bytes().decode()
+    for old, new in changes:
+        assert old in text
+        (tmp_path / "p" / name).write_bytes(text.replace(old, new, 1).encode())
+        assert run_command(verify, tmp_path)[0] != 0
