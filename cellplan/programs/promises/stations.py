@@ -1,8 +1,8 @@
 """Stations: the part as controllers have to know it, in every pose in which tools work on it.
 
 A part that stands still while a tool works has a fixed frame in each of its poses; one that a robot of the same
-controller holds has a frame that goes with the flange of this robot, whether it moves or not, but on controllers for
-which only fixed frames are written.
+controller holds has a frame that goes with the flange of this robot, whether it moves or not; where programs can state
+fixed frames only, it has such a frame as long as the part is at rest.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from cellplan.programs.promises.run_programs import run_programs
 from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
-FIXED: Final = frozenset({"fanuc"})  # kinds for which no frame is written that another robot moves
+FIXED: Final = frozenset({"fanuc"})  # kinds whose programs of lines state fixed frames only
 SAME_TOL: Final = 1e-6  # [m] and [rad] within which poses of a part are one
 
 
@@ -51,21 +51,24 @@ def _station(cell: Cell, task: Task, q: Array) -> Station:
         X_W = part.X_CP if task.relative_to is Frame.PART else np.eye(4)
         return Station(tasks=(task.name,), X=inverse(controller_base(robot)) @ X_W, X_W=X_W)
     holder = cell.robot(part.held_by[0].robot)
-    if _has_frame_on(cell, holder, robot):
-        return Station(tasks=(task.name,), holder=holder.name, X=on_flange(holder, holder.tool.X_FT @ part.X_CP))
     X_WP = ScrewChain(holder).tool_poses(q[:, cell.columns(holder.name)]) @ part.X_CP
     farthest = np.argmax(np.abs(X_WP - X_WP[0]).max(axis=(1, 2)))
-    if not _is_same(X_WP[0], X_WP[farthest]):
+    is_at_rest = _is_same(X_WP[0], X_WP[farthest])
+    if _is_on_one_controller(holder, robot) and not (is_at_rest and _kind(cell, robot) in FIXED):
+        return Station(tasks=(task.name,), holder=holder.name, X=on_flange(holder, holder.tool.X_FT @ part.X_CP))
+    if not is_at_rest:
         return Station(tasks=(task.name,))
     return Station(tasks=(task.name,), X=inverse(controller_base(robot)) @ X_WP[0], X_W=X_WP[0])
 
 
-def _has_frame_on(cell: Cell, holder: Robot, robot: Robot) -> bool:
-    """Whether the controller of a robot moves a frame of the part with the robot that holds it."""
-    if holder.control is None or robot.control is None or holder.control.id != robot.control.id:
-        return False
-    controller = cell.controllers.get(robot.control.id)
-    return controller is None or controller.kind not in FIXED
+def _is_on_one_controller(one: Robot, other: Robot) -> bool:
+    return one.control is not None and other.control is not None and one.control.id == other.control.id
+
+
+def _kind(cell: Cell, robot: Robot) -> str | None:
+    """The kind of the controller of a robot."""
+    controller = None if robot.control is None else cell.controllers.get(robot.control.id)
+    return None if controller is None else controller.kind
 
 
 def _join(known: list[Station], other: Station) -> None:

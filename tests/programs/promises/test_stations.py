@@ -123,7 +123,7 @@ def test_groups_of_a_fanuc_controller_have_a_fixed_frame_for_each_pose_in_which_
     for name in WORKERS:
         assert fixed[name][0].holder is None
         np.testing.assert_array_equal(fixed[name][0].X, apart[name][0].X)
-    assert (moved.holder, moved.X) == (None, None)
+    assert (moved.holder, moved.X_W) == ("left", None)
 
 
 def test_poses_are_numbered_in_the_order_of_work_and_each_counts_once(in_turn: ReadRun) -> None:
