@@ -10,7 +10,7 @@ from builders.fanuc_jobs import seam_job
 
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.geometry.transforms import rotation_vector
-from cellplan.model.report.exported import ExportJob
+from cellplan.model.report.exported import ExportJob, Station
 from cellplan.programs.elements.corners import row_shares
 from cellplan.programs.formats.fanuc_ls.poses import configuration
 from cellplan.programs.formats.fanuc_ls.writer import FANUC_LS
@@ -174,10 +174,11 @@ def test_what_lines_need_of_the_cell_is_refused_at_its_key() -> None:
     job = seam_job()
     robot = job.frame.cell.robots[0]
 
-    def said(**control: object) -> str:
+    def said(stations: tuple[Station, ...] | None = None, **control: object) -> str:
         assert robot.control is not None
         changed = replace(robot, control=robot.control.model_copy(update=control))
         frame = replace(job.frame, cell=replace(job.frame.cell, robots=(changed,)))
+        frame = frame if stations is None else replace(frame, stations={"alpha": stations})
         with pytest.raises(InputError) as error:
             FANUC_LS.render(replace(job, frame=frame))
         return str(error.value)
@@ -185,6 +186,8 @@ def test_what_lines_need_of_the_cell_is_refused_at_its_key() -> None:
     key = "robots.alpha.controller"
     assert said(frames=()) == f"{key}.frames: expected the numbers of the frames of the part, 1 to 9, got none"
     assert said(tool_number=None).startswith(f"{key}.tool_number: expected the number of its tool frame")
+    held = (Station(tasks=("work_of_alpha",), number=4, holder="table", X=np.eye(4)),)
+    assert said(held).startswith("--moves linear: expected a part that no group of 'r30' holds, got 'table'")
 
 
 def test_a_feed_that_cannot_be_written_is_refused() -> None:

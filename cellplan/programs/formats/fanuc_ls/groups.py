@@ -137,12 +137,18 @@ def demands(frame: ExportFrame, _rows: int = 0) -> Iterator[Callable[[], object]
 
 
 def _require_stations(frame: ExportFrame, robot: str) -> None:
-    """Refuse linear moves without the numbers of their frames."""
+    """Refuse linear moves without the numbers of their frames, and on a part that another group holds."""
     control, key = frame.robot(robot).control, f"robots.{robot}.controller"
     if control is None or not (control.frames or control.base_number):
         raise InputError(f"{key}.frames: expected the numbers of the frames of the part, 1 to {FRAMES[1]}, got none")
     if control.tool_number is None:
         raise InputError(f"{key}.tool_number: expected the number of its tool frame, from which it moves, got none")
+    for station in frame.stations.get(robot, ()):
+        if station.holder is not None:
+            raise InputError(
+                f"--moves linear: expected a part that no group of '{control.id}' holds, got '{station.holder}': "
+                "fanuc_ls moves tools by joints there"
+            )
 
 
 def _require_axes(robot: Robot) -> None:
