@@ -54,6 +54,7 @@ NAMES: dict[str, Any] = {
     f"{RIGHT}.tool_number": 2,
     f"{RIGHT}.base_number": 4,
     f"{RIGHT}.frames": (1, 3),
+    f"{RIGHT}.step_register": 9,
     f"{RIGHT}.handshake": {"output": 71, "inputs": {"left": 81}},
 }
 BOUND: dict[str, Any] = {
