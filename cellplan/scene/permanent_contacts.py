@@ -1,11 +1,13 @@
 """Pairs that touch, or come near, in every configuration: a robot's own design, or a mistake in its mounting."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
+from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.left_out import LeftOutKind
@@ -13,7 +15,7 @@ from cellplan.model.robot.robot import RobotModel
 from cellplan.model.seeds import generator
 from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, part_body
-from cellplan.scene.collision.bodies import BodyPoses
+from cellplan.scene.collision.bodies import BodyPoses, prepare
 from cellplan.scene.collision.distance import measure
 from cellplan.scene.collision.engine import Engine
 from cellplan.scene.collision.overlap.containment import is_inside
@@ -143,15 +145,10 @@ class _Sampled:
         """Whether a link touches a thing in every configuration, apart from rounding."""
         poses, (first, second) = self.poses(None), (pair.first, pair.second)
         if not is_ground(self.bodies[second]):
-            return all(distance <= CONTACT_TOL for distance in self.distances(pair, None))
+            readings = (measure(self.engine, (first, second), poses, sample=k) for k in range(poses.p.shape[1]))
+            return all(reading.bound <= CONTACT_TOL for reading in readings)
         height = heights(self.engine.bodies[first].hull, poses.R[first], poses.p[first], X_WS=self.bodies[second].X_BS)
         return bool(np.all(height <= CONTACT_TOL))
-
-    def distances(self, pair: ScenePair, holder: str | None) -> Iterator[float]:
-        """Distance of two bodies in [m] in one configuration after the other, measured when it is asked for."""
-        poses, ends = self.poses(holder), (pair.first, pair.second)
-        for k in range(poses.p.shape[1]):
-            yield measure(self.engine, ends, poses, sample=k).bound
 
 
 def _views(cell: Cell, bodies: Sequence[SceneBody]) -> dict[str | None, Sequence[SceneBody]]:
@@ -225,13 +222,25 @@ def _mount_behind(design: Design, sampled: _Sampled, pair: ScenePair, holder: st
 
 def _relaxed(pair: ScenePair, sampled: _Sampled, holder: str | None) -> ScenePair:
     """The pair, checked for contact only where the distance between the two is a matter of their mounting."""
-    nearest, farthest = np.inf, -np.inf
-    for distance in sampled.distances(pair, holder):
+    poses, ends = sampled.poses(holder), [pair.first, pair.second]
+    first, second = (sampled.engine.bodies[end].shape for end in ends)
+    why = _why_fixed(first, second, poses.R[ends].tobytes(), poses.p[ends].tobytes(), pair.demand)
+    return pair if why is None else replace(pair, rule=Rule.CONTACT, reason=f"checked for contact only: {why}")
+
+
+@lru_cache(maxsize=1024)
+def _why_fixed(first: Solid, second: Solid, R: bytes, p: bytes, demand: float) -> str | None:
+    """How the mounting of two bodies sets their distance; None where it does not.
+
+    A cell is made computable more than once, with the same robots at the same places.
+    """
+    engine, nearest, farthest = Engine([prepare("first", first), prepare("second", second)]), np.inf, -np.inf
+    poses = BodyPoses(np.frombuffer(R).reshape(2, -1, 3, 3), np.frombuffer(p).reshape(2, -1, 3))
+    for sample in range(poses.p.shape[1]):
+        distance = measure(engine, (0, 1), poses, sample=sample).bound
         nearest, farthest = min(nearest, distance), max(farthest, distance)
-        if farthest >= pair.demand - ROUNDING and farthest - nearest > CONSTANT_DISTANCE_TOL:
-            return pair  # whatever it is elsewhere
-    if farthest < pair.demand - ROUNDING:
-        reason = "checked for contact only: closer than the required clearance in every configuration by the mounting"
-        return replace(pair, rule=Rule.CONTACT, reason=reason)
-    reason = "checked for contact only: their distance is fixed by the mounting"
-    return replace(pair, rule=Rule.CONTACT, reason=reason)
+        if farthest >= demand - ROUNDING and farthest - nearest > CONSTANT_DISTANCE_TOL:
+            return None  # whatever it is elsewhere
+    if farthest < demand - ROUNDING:
+        return "closer than the required clearance in every configuration by the mounting"
+    return "their distance is fixed by the mounting"
