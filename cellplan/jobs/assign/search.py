@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 from cellplan.errors import ImpossibleTasksError, NoSolutionError
 from cellplan.jobs.assign.columns import verified_columns
 from cellplan.jobs.assign.draft import AssignmentDraft
+from cellplan.jobs.assign.planned_ends import planned_ends
 from cellplan.jobs.assign.written import goals_written_otherwise, written_points
 from cellplan.model.cell.cell import Timing
 from cellplan.model.progress import Progress
@@ -81,7 +83,9 @@ class AssignmentSearch:
         search = ModeSearch(cell=cell, goals=directed, stations=stations, spins=draft.spins(), tool_fits=fits)
         table = search.table()
         certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))
-        self._refinement = Refinement(search=search, clearance=clearance, certifier=certifier)
+        self._refinement = Refinement(
+            search=search, clearance=clearance, certifier=certifier, planned_ends=partial(planned_ends, draft)
+        )
         progress("stations", 0.0)
         rules = TaskRules.of(cell)
         used, modes = choose_stations(table, goals, clearance, most=self._most_stations, rules=rules)
@@ -124,7 +128,10 @@ class AssignmentSearch:
             answer = best_blocks(instance, least=least, effort=self._effort, hint=exchanged)
         schedules = [exchanged] if answer.schedule is None else [exchanged, answer.schedule]
         certified = sorted((certifier.best(sequencer, it) for it in schedules), key=lambda it: it.steps)
+        others = sorted(map(sequencer.ordered, answer.others), key=lambda it: it.steps)
         best, refined = certified[0], instance
+        for other in others:
+            best = certifier.settle(sequencer, other.schedule, below=best)
         if is_refined:
             best, refined = self._refinement.shortened(best, sequencer)
         bound = answer.bound
@@ -136,7 +143,7 @@ class AssignmentSearch:
             bound=bound,
             is_proved=answer.is_proved,
             greedy=nearest,
-            others=(*certified[1:], *map(sequencer.ordered, answer.others)),
+            others=(*certified, *others),
             examined=certifier.examined,
             refused=len(sequencer.refusals),
         )

@@ -1,4 +1,4 @@
-"""The cell that an assignment writes: its draft with the values that were chosen."""
+"""The cell that an assignment writes: its draft with the values that were chosen, and where its tasks end in it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -32,14 +32,14 @@ def written_cell(draft: AssignmentDraft, instance: Instance, sequenced: Sequence
     for block, (station, ends), cleaned in stops:
         for end in ends:
             if end is not None:
-                values |= task_values(draft.cell, end, before, _holder(instance, station))
+                values |= task_values(draft.cell, end, before, holder_at(instance, station))
                 values |= {f"tasks.{end.mode.task}.holder_moves": True} if station in instance.columns else {}
                 values |= via_values(draft.cell, end.mode.task, is_cleaned=end.mode.robot in cleaned)
         before = block
     return draft.cell.with_values(values | order_values(sequenced, instance.step))
 
 
-def _holder(instance: Instance, station: int | None) -> tuple[str, Array] | None:
+def holder_at(instance: Instance, station: int | None) -> tuple[str, Array] | None:
     """Holder and its configuration at a station; None for a part that is fixed."""
     holder = instance.stations.holder
     return None if holder is None or station is None else (holder, instance.stations.q[station])

@@ -1,6 +1,6 @@
 """The instance that a schedule is made for: few stations, the free modes at them, times in whole steps, conflicts."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations, product
@@ -18,6 +18,15 @@ from cellplan.search.assign.problem.rules import TaskRules
 from cellplan.search.assign.problem.table import Key, TaskMode
 
 Conflict = frozenset[Key]  # two of task, robot and station that cannot be at work together
+EndIdentity = tuple[str, str, bool, bytes]  # task, robot, direction and where it begins
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlannedEnd:
+    """What is known of one way to do a task once it was planned."""
+
+    q: Array  # where the robot leaves it in [rad] or [m], shape (n,)
+    steps: int | None = None  # how long it takes where it is retimed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -26,6 +35,7 @@ class End:
 
     mode: TaskMode
     is_reversed: bool
+    planned: PlannedEnd | None = None  # None where that was not planned, or is as the mode has it
 
     @property
     def begin(self) -> Array:
@@ -35,7 +45,12 @@ class End:
     @property
     def end(self) -> Array:
         """Configuration in which it leaves the task, shape (n,)."""
-        return self.mode.q[0 if self.is_reversed else -1]
+        return self.mode.q[0 if self.is_reversed else -1] if self.planned is None else self.planned.q
+
+    @property
+    def identity(self) -> EndIdentity:
+        """Task, robot, direction and where it begins: what is planned depends on nothing else."""
+        return self.mode.task, self.mode.robot, self.is_reversed, self.begin.tobytes()
 
 
 COMES: Final = "comes to it"  # at a via point; no task has such a name: names have no spaces
@@ -66,6 +81,7 @@ class Instance:
     step: float  # time between two rows in [s]
     rules: TaskRules = TaskRules()  # noqa: RUF009 - frozen
     columns: Mapping[int, frozenset[Key]] = field(default_factory=dict)  # tasks of blocks with moving parts, by station
+    planned: Mapping[EndIdentity, PlannedEnd] = field(default_factory=dict)
 
     @cached_property
     def tasks(self) -> tuple[str, ...]:
@@ -116,11 +132,20 @@ class Instance:
         least = None if end is None or end.mode.task not in self.goals else self.goals[end.mode.task].stand_off_steps
         if end is None or least is None:
             return 0
+        if end.planned is not None and end.planned.steps is not None:
+            return max(0, end.planned.steps - self.steps(end.mode.task))
         return max(0, stand_off_steps(end.mode, self.bounds[end.mode.robot], self.step) - least)
 
     def ends(self, task: str, robot: str, station: int) -> list[End]:
         """All modes in all directions."""
-        return [End(mode=mode, is_reversed=it) for mode in self.modes[task, robot, station] for it in mode.directions]
+        ends = [End(mode=mode, is_reversed=it) for mode in self.modes[task, robot, station] for it in mode.directions]
+        return [replace(end, planned=self.planned.get(end.identity)) for end in ends] if self.planned else ends
+
+    def of_stops(self, stops: Iterable[Sequence[End | None]]) -> Self:
+        """The same with nothing but the modes and directions in some stops."""
+        ends = [end for stop in stops for end in stop if end is not None]
+        modes = ((end.mode, replace(end.mode, directions=(end.is_reversed,))) for end in ends)
+        return self.with_modes({(it.task, it.robot, it.station): (only,) for it, only in modes})
 
     def transfer_steps(self, robot: str, first: Array, second: Array) -> Indices:
         """Whole steps of straight moves from rest to rest, broadcast over configurations of shape (..., n)."""

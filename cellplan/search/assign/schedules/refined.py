@@ -1,5 +1,11 @@
-"""More modes of what a schedule chose, at finer turns of the tools, so that transfers get shorter."""
+"""More modes of what a schedule chose, at finer turns of the tools, so that transfers get shorter.
 
+A tool with a free spin leaves its task at another turn than that of its mode, and a retimed task takes longer than its
+joints do one by one. Both is known once the task was planned; then the modes are chosen again, until those of the
+shortest sequence were all planned.
+"""
+
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final
@@ -8,15 +14,17 @@ import numpy as np
 
 from cellplan.search.assign.problem.clearance import AssignmentClearance
 from cellplan.search.assign.problem.goals import Stations
-from cellplan.search.assign.problem.instance import Instance
+from cellplan.search.assign.problem.instance import EndIdentity, Instance, PlannedEnd
 from cellplan.search.assign.problem.table import Key, ModeSearch, TaskMode
-from cellplan.search.assign.schedules.order import SequencedBlocks, Sequencer
+from cellplan.search.assign.schedules.order import Refusal, SequencedBlocks, Sequencer
 from cellplan.search.assign.schedules.transfers import TransferCertifier
 
 FINER: Final = 2  # turns of the tool for one that was compared before
 CHOICES: Final = 600  # of modes and directions of all robots in a block together
 MOST_TRIED: Final = 60  # orders of the blocks, with these modes
-TRIES: Final = 8  # sequences of which robots meet in a block, until the first one is kept
+TRIES: Final = 24  # sequences of which robots meet in a block or end elsewhere, until the best one is kept
+
+PlannedEnds = Callable[[Instance, SequencedBlocks], Mapping[EndIdentity, PlannedEnd]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -26,6 +34,7 @@ class Refinement:
     search: ModeSearch  # what the modes so far were looked for among
     clearance: AssignmentClearance
     certifier: TransferCertifier
+    planned_ends: PlannedEnds  # what is known of the tasks of a sequence once they were planned
 
     def shortened(self, best: SequencedBlocks, sequencer: Sequencer) -> tuple[SequencedBlocks, Instance]:
         """The same tasks of the same robots with more modes, and the instance that has them.
@@ -34,17 +43,32 @@ class Refinement:
             best: Blocks with certified transfers.
             sequencer: By which they were sequenced.
         """
-        instance = self._with_more_modes(sequencer.instance, best)
+        best, instance = self._as_planned(best, self._with_more_modes(sequencer.instance, best), sequencer.refusals)
         for _ in range(TRIES):
             finer = Sequencer(instance, refusals=sequencer.refusals)
             shorter = self.certifier.shortened(finer, self.certifier.settle(finer, best.schedule), most=MOST_TRIED)
             if shorter.steps >= best.steps:
                 break
-            met = self._met(instance, shorter)
-            if not met:
-                return shorter, instance
-            instance = replace(instance, modes={**instance.modes, **met})
+            if met := self._met(instance, shorter):
+                instance = replace(instance, modes={**instance.modes, **met})
+                continue
+            planned, learned = self._as_planned(shorter, instance, sequencer.refusals)
+            best = min(best, planned, key=lambda it: it.steps)
+            if learned is instance:
+                break
+            instance = learned
         return best, instance
+
+    def _as_planned(
+        self, sequenced: SequencedBlocks, instance: Instance, refusals: list[Refusal]
+    ) -> tuple[SequencedBlocks, Instance]:
+        """A sequence with the ends of its tasks as they are planned, and the instance that has them."""
+        planned = self.planned_ends(instance, sequenced)
+        if not planned:
+            return sequenced, instance
+        instance = replace(instance, planned={**instance.planned, **planned})
+        only = Sequencer(instance.of_stops(it for _, it in sequenced.stops), refusals=refusals)
+        return self.certifier.settle(only, sequenced.schedule), instance
 
     def _with_more_modes(self, instance: Instance, best: SequencedBlocks) -> Instance:
         """The instance with more modes of every task that is done, free of collisions."""
