@@ -22,20 +22,12 @@ EndIdentity = tuple[str, str, bool, bytes]  # task, robot, direction and where i
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PlannedEnd:
-    """What is known of one way to do a task once it was planned."""
-
-    q: Array  # where the robot leaves it in [rad] or [m], shape (n,)
-    steps: int | None = None  # how long it takes where it is retimed
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class End:
     """One way to begin and end a task."""
 
     mode: TaskMode
     is_reversed: bool
-    planned: PlannedEnd | None = None  # None where that was not planned, or is as the mode has it
+    planned: Array | None = None  # where it leaves the task as it was planned, shape (n,); None where the mode has it
 
     @property
     def begin(self) -> Array:
@@ -45,7 +37,7 @@ class End:
     @property
     def end(self) -> Array:
         """Configuration in which it leaves the task, shape (n,)."""
-        return self.mode.q[0 if self.is_reversed else -1] if self.planned is None else self.planned.q
+        return self.mode.q[0 if self.is_reversed else -1] if self.planned is None else self.planned
 
     @property
     def identity(self) -> EndIdentity:
@@ -81,7 +73,7 @@ class Instance:
     step: float  # time between two rows in [s]
     rules: TaskRules = TaskRules()  # noqa: RUF009 - frozen
     columns: Mapping[int, frozenset[Key]] = field(default_factory=dict)  # tasks of blocks with moving parts, by station
-    planned: Mapping[EndIdentity, PlannedEnd] = field(default_factory=dict)
+    planned: Mapping[EndIdentity, Array] = field(default_factory=dict)  # where tools with a free spin leave their tasks
 
     @cached_property
     def tasks(self) -> tuple[str, ...]:
@@ -132,8 +124,6 @@ class Instance:
         least = None if end is None or end.mode.task not in self.goals else self.goals[end.mode.task].stand_off_steps
         if end is None or least is None:
             return 0
-        if end.planned is not None and end.planned.steps is not None:
-            return max(0, end.planned.steps - self.steps(end.mode.task))
         return max(0, stand_off_steps(end.mode, self.bounds[end.mode.robot], self.step) - least)
 
     def ends(self, task: str, robot: str, station: int) -> list[End]:

@@ -1,8 +1,7 @@
 """More modes of what a schedule chose, at finer turns of the tools, so that transfers get shorter.
 
-A tool with a free spin leaves its task at another turn than that of its mode, and a retimed task takes longer than its
-joints do one by one. Both is known once the task was planned; then the modes are chosen again, until those of the
-shortest sequence were all planned.
+A tool with a free spin leaves its task at another turn than that of its mode. Where, is known once the task was
+planned; then the modes are chosen again, until those of the shortest sequence were all planned.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,9 +11,10 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.geometry.arrays import Array
 from cellplan.search.assign.problem.clearance import AssignmentClearance
 from cellplan.search.assign.problem.goals import Stations
-from cellplan.search.assign.problem.instance import EndIdentity, Instance, PlannedEnd
+from cellplan.search.assign.problem.instance import EndIdentity, Instance
 from cellplan.search.assign.problem.table import Key, ModeSearch, TaskMode
 from cellplan.search.assign.schedules.order import Refusal, SequencedBlocks, Sequencer
 from cellplan.search.assign.schedules.transfers import TransferCertifier
@@ -24,7 +24,7 @@ CHOICES: Final = 600  # of modes and directions of all robots in a block togethe
 MOST_TRIED: Final = 60  # orders of the blocks, with these modes
 TRIES: Final = 24  # sequences of which robots meet in a block or end elsewhere, until the best one is kept
 
-PlannedEnds = Callable[[Instance, SequencedBlocks], Mapping[EndIdentity, PlannedEnd]]
+PlannedEnds = Callable[[Instance, SequencedBlocks], Mapping[EndIdentity, Array]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,7 +34,7 @@ class Refinement:
     search: ModeSearch  # what the modes so far were looked for among
     clearance: AssignmentClearance
     certifier: TransferCertifier
-    planned_ends: PlannedEnds  # what is known of the tasks of a sequence once they were planned
+    planned_ends: PlannedEnds  # where the robots leave the tasks of a sequence as they are planned
 
     def shortened(self, best: SequencedBlocks, sequencer: Sequencer) -> tuple[SequencedBlocks, Instance]:
         """The same tasks of the same robots with more modes, and the instance that has them.
