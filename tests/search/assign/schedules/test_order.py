@@ -65,7 +65,7 @@ def steps_with(instance: Instance, end: End) -> int:
     return with_stand_offs(process, {key: [end.mode]}, instance.bounds, instance.step).steps
 
 
-@pytest.mark.parametrize("kind", ["as written", "retimed", "via points"])
+@pytest.mark.parametrize("kind", ["as written", "retimed", "via points", "planned ends"])
 @pytest.mark.parametrize("seed", range(4))
 def test_no_choice_of_modes_is_faster(seed: int, kind: str) -> None:
     instance = small_instance(seed, 5, modes=2)
@@ -89,6 +89,10 @@ def test_no_choice_of_modes_is_faster(seed: int, kind: str) -> None:
             for name, goal in instance.goals.items()
         }
         instance = replace(instance, goals=timed)
+    if kind == "planned ends":
+        rng = np.random.default_rng(seed)
+        every_end = (end for key in instance.modes for end in instance.ends(*key))
+        instance = replace(instance, planned={it.identity: rng.uniform(-1.0, 1.0, 2) for it in every_end})
     schedule = greedy_schedule(instance)
 
     sequenced = Sequencer(instance).sequenced(schedule)
@@ -98,6 +102,7 @@ def test_no_choice_of_modes_is_faster(seed: int, kind: str) -> None:
     picked = {end.mode.task: end for _, stop in sequenced.stops for end in stop if end is not None}
     assert sequenced.steps == min(steps_of(instance, schedule, choice) for choice in every)
     assert sequenced.steps == steps_of(instance, schedule, picked)
+    assert Sequencer(instance.of_stops(it for _, it in sequenced.stops)).sequenced(schedule).steps == sequenced.steps
 
 
 def test_a_refused_transfer_is_avoided_or_costs_what_it_takes() -> None:
