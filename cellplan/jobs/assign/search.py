@@ -82,10 +82,7 @@ class AssignmentSearch:
         directed, fits = [*goals, *goals_written_otherwise(draft, goals)], clearance.tool_fits
         search = ModeSearch(cell=cell, goals=directed, stations=stations, spins=draft.spins(), tool_fits=fits)
         table = search.table()
-        certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))
-        self._refinement = Refinement(
-            search=search, clearance=clearance, certifier=certifier, planned_ends=partial(planned_ends, draft)
-        )
+        self._refinement = self._refined_by(search, clearance)
         progress("stations", 0.0)
         rules = TaskRules.of(cell)
         used, modes = choose_stations(table, goals, clearance, most=self._most_stations, rules=rules)
@@ -115,6 +112,12 @@ class AssignmentSearch:
             "conflicts": len(instance.conflicts),
         } | ({"moving_blocks": len(columns)} if settings.groups else {})
         return instance
+
+    def _refined_by(self, search: ModeSearch, clearance: AssignmentClearance) -> Refinement:
+        """What refines the modes of a search: certified transfers, and where tools with a free spin end."""
+        certifier = TransferCertifier(scene=self._scene, home=self.draft.home, retimer=transfer_retimer(self._scene))
+        ends = partial(planned_ends, self.draft)
+        return Refinement(search=search, clearance=clearance, certifier=certifier, planned_ends=ends)
 
     def planned(self, instance: Instance, *, is_refined: bool) -> PlannedBlocks:
         """The best schedule of an instance, with certified transfers."""
