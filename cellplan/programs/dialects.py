@@ -7,6 +7,7 @@ from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.escapes import EscapeForm
 from cellplan.programs.formats.csv import CSV
 from cellplan.programs.formats.fanuc_ls.writer import FANUC_LS
+from cellplan.programs.formats.inform.writer import INFORM
 from cellplan.programs.formats.json_tables import JSON
 from cellplan.programs.formats.krl.escape import KRL_ESCAPE
 from cellplan.programs.formats.krl.writer import KRL
@@ -19,6 +20,6 @@ from cellplan.programs.formats.urscript.writer import URSCRIPT
 from cellplan.programs.formats.val3.writer import VAL3
 
 DIALECTS: Final[Mapping[str, Dialect]] = {
-    dialect.name: dialect for dialect in (CSV, FANUC_LS, JSON, KRL, RAPID, ROS2, STREAM, URSCRIPT, VAL3)
+    dialect.name: dialect for dialect in (CSV, FANUC_LS, INFORM, JSON, KRL, RAPID, ROS2, STREAM, URSCRIPT, VAL3)
 }
 ESCAPES: Final[Mapping[str, EscapeForm]] = {"krl": KRL_ESCAPE, "rapid": RAPID_ESCAPE, "urscript": URSCRIPT_ESCAPE}

@@ -1,0 +1,147 @@
+"""Strict reader of jobs: the written subset and harmless variants of it, nothing else."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple, NoReturn
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.model.cell.cell import Robot
+from cellplan.model.report.exported import ExportFrame, ProgramRows, Promise, RobotRows
+from cellplan.model.units import MM
+from cellplan.programs.elements.corners import LARGEST_SHARE
+from cellplan.programs.elements.paced import ReadMove, rows_of_moves
+from cellplan.programs.elements.text import Statement
+from cellplan.programs.formats.inform.jobs import JobFrame, inform_events, job_names, tasks_of
+from cellplan.programs.formats.inform.positions import joints_of
+from cellplan.programs.formats.inform.text import JobFile, JobPosition, read_job
+
+ARC: Final = 3  # motions of an arc: to its start, where the tool is already, through a point, and to its end
+
+
+class Motion(NamedTuple):
+    """A motion of a job."""
+
+    statement: Statement
+    positions: tuple[JobPosition, ...]  # its end; before it the point through which an arc leads
+    is_passed: bool  # whether its end is rounded
+
+
+def read_inform(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
+    """Read the files of an export back; an ``InputError`` has file and line."""
+    left, programs = dict(files), []
+    mains, _ = job_names(frame)
+    for program in frame.programs:
+        rows = {name: _RobotReader(frame, frame.robot(name), left).rows(mains[program, name]) for name in frame.robots}
+        if len({len(one.marks) for one in rows.values()}) > 1:
+            raise InputError(f"{mains[program, frame.robots[-1]]}.JBI: expected as many marks as the other robots have")
+        programs.append(ProgramRows(name=program, robots=rows))
+    if left:
+        raise InputError(f"{min(left)}: expected no such file in this export")
+    return tuple(programs)
+
+
+class _RobotReader:
+    """Follows the jobs of one robot."""
+
+    def __init__(self, frame: ExportFrame, robot: Robot, left: dict[str, str]) -> None:
+        """Take the files that are left."""
+        self._frame, self._robot, self._left = frame, robot, left
+        self._tasks = dict(tasks_of(frame, robot.name))
+        self._moves: list[ReadMove] = []
+        self._between: list[list[str]] = [[]]
+
+    def rows(self, name: str) -> RobotRows:
+        """The rows of a main job and of those of seams that it calls, each once."""
+        base = JobFrame.of(self._robot, None)
+        job = read_job(self._left, name, base)
+        for item in motions_of(job):
+            called = item.words[0] if isinstance(item, Statement) and item.kind == "CALL" else None
+            task = self._tasks.pop(called, None) if called else None
+            if called and task:
+                seam = JobFrame.of(self._robot, self._frame.station(self._robot.name, task))
+                self._follow(motions_of(read_job(self._left, called, seam)), seam, task)
+            else:
+                self._follow([item], base, None)
+        events = inform_events(self._frame, self._robot.name)
+        if not self._moves:
+            raise job.end.error("at least two motions", "none")
+        rows = rows_of_moves(events, self._moves, self._between[1:])
+        if tuple(map(events.plain, self._between[0])) != tuple(map(events.plain, events.before(bool(rows.marks)))):
+            raise job.end.error("before the first motion what lowers its output, where robots wait for one another")
+        return replace(rows, process=None) if self._frame.promise is Promise.SEQUENCE_ONLY else rows
+
+    def _follow(
+        self, items: Iterator[Motion | Statement] | Sequence[Motion | Statement], frame: JobFrame, task: str | None
+    ) -> None:
+        """Motions of a job in a frame, and the statements behind each."""
+        for item in items:
+            if isinstance(item, Statement):
+                self._between[-1].append(item.text)
+            else:
+                self._moves.append(self._read(item, frame, task))
+                self._between.append([])
+
+    def _read(self, motion: Motion, frame: JobFrame, task: str | None) -> ReadMove:
+        """A motion with its joints, or with its poses."""
+        statement, end = motion.statement, motion.positions[-1]
+        is_joint = statement.kind == "MOVJ"
+
+        def refuse(expected: str, got: str | None) -> NoReturn:
+            raise statement.error(expected, got)
+
+        q = joints_of(self._robot, frame.X_WC @ end.X, end.stated) if is_joint else np.full(len(end.stated), np.nan)
+        if q is None:
+            raise end.statement.error(f"a position that the arm reaches in its configuration {end.stated.tolist()}")
+        return ReadMove(
+            refuse=refuse,
+            task=task,
+            q=q,
+            poses=() if is_joint else tuple(position.X for position in motion.positions),
+            configurations=None if is_joint else tuple(position.stated.tolist() for position in motion.positions),
+            feed=np.nan if is_joint else float(str(statement.words[1])) / MM,
+            share=LARGEST_SHARE if motion.is_passed else 0.0,
+        )
+
+
+def motions_of(job: JobFile) -> Iterator[Motion | Statement]:
+    """Motions of a job, and its other statements, in their order; each position is used by one motion."""
+    unused = dict(job.positions)
+    here: Motion | None = None
+    is_behind_arc, place = False, 0
+    while place < len(job.statements):
+        statement = job.statements[place]
+        if statement.kind in {"CALL", ""}:
+            yield statement
+            place += 1
+            continue
+        motion = _motion(statement, unused)
+        rest = [inner for inner in job.statements[place + 1 : place + 1 + ARC] if inner.kind == "MOVC"]
+        if is_behind_arc and here and statement.kind == "MOVL" and len(rest) == ARC and _repeats(motion, here):
+            is_behind_arc, place = False, place + 1
+            continue
+        if statement.kind == "MOVC":
+            if here is None or is_behind_arc or len(rest) < ARC - 1 or not _repeats(motion, here):
+                raise statement.error("MOVC to where the tool is, through a point and to the end; MOVL between arcs")
+            through, end = (_motion(inner, unused) for inner in rest[: ARC - 1])
+            if not through.is_passed or {inner.words[1] for inner in rest[: ARC - 1]} != {statement.words[1]}:
+                raise through.statement.error("a point of an arc that is passed, at the speed of its start")
+            motion, place = end._replace(positions=(*through.positions, *end.positions)), place + ARC - 1
+        here, is_behind_arc, place = motion, statement.kind == "MOVC", place + 1
+        yield motion
+    if unused:
+        raise next(iter(unused.values())).statement.error("each position used by one motion", "none that uses it")
+
+
+def _motion(statement: Statement, unused: dict[int, JobPosition]) -> Motion:
+    """A motion to a position that no other one used."""
+    number = int(str(statement.words[0]))
+    if number not in unused:
+        raise statement.error("a position that is declared, and used once")
+    return Motion(statement, (unused.pop(number),), statement.words[-1] != "0")
+
+
+def _repeats(motion: Motion, here: Motion) -> bool:
+    """Whether a motion leads to where the last one ended, rounded or not as that one."""
+    return motion.positions[-1].is_that_of(here.positions[-1]) and motion.is_passed is here.is_passed

@@ -1,0 +1,195 @@
+"""INFORM: jobs with seams are read back as they were, and every change of a file is noticed."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders.elbow_arm import tip
+from builders.seam_jobs import ROBOT, SEAM, X_WP, run_of, seam_job
+
+from cellplan.errors import InputError, NotVerifiedError
+from cellplan.geometry.transforms import pose_from, rotation_exp
+from cellplan.model.report.exported import ExportJob
+from cellplan.programs.formats.inform.positions import configuration, joints_of
+from cellplan.programs.formats.inform.writer import INFORM
+from cellplan.programs.judgement.compare_rows import other_rows
+from cellplan.programs.seams.executed import executed_programs
+from cellplan.scene.kinematics.screw_chain import ScrewChain
+
+ARC = {"on": ["ARCON ASF#(1)", "WVON WEV#(1)"], "off": ["WVOF", "ARCOF AEF#(1)"]}
+TURNS = np.eye(3)
+
+
+def inform_job(**stated: object) -> ExportJob:
+    """The job of a yaskawa arm; the corner between its lines may be rounded over half of them."""
+    job = seam_job("yaskawa", process=ARC, control={"tool_number": 1, "frames": (2,)} | stated, number=2)
+    rows = job.programs[0].robots[ROBOT]
+    assert rows.rounding is not None
+    rounded = replace(rows, rounding=np.where(rows.rounding > 0.0, 0.5, 0.0))
+    return replace(job, programs=(replace(job.programs[0], robots={ROBOT: rounded}),))
+
+
+@pytest.fixture(scope="module")
+def job() -> ExportJob:
+    return inform_job()
+
+
+@pytest.fixture(scope="module")
+def files(job: ExportJob) -> dict[str, str]:
+    return INFORM.render(job)
+
+
+def test_a_job_and_that_of_its_seam_come_back_as_they_were(job: ExportJob, files: dict[str, str]) -> None:
+    written = job.programs[0].robots[ROBOT]
+
+    (program,) = INFORM.read(job.frame, files)
+
+    rows = program.robots[ROBOT]
+    assert sorted(files) == ["ALPHA.JBI", "SEAM.JBI"]
+    assert list(other_rows(INFORM, job, (program,))) == []
+    assert rows.seams == (SEAM,)
+    assert np.array_equal(rows.process, written.process)
+    np.testing.assert_allclose(rows.feeds, written.feeds, atol=1e-9)
+    np.testing.assert_allclose(rows.q[[0, 1, 7]], written.q[[0, 1, 7]], atol=2e-5)
+    (executed,) = executed_programs(job, INFORM, [run_of(job)], (program,))
+    np.testing.assert_allclose(executed.robots[ROBOT].q[-1], written.q[-1], atol=2e-5)
+
+
+def test_positions_put_the_tool_where_the_joints_do(job: ExportJob, files: dict[str, str]) -> None:
+    """Angles of a position turn about the fixed axes x, y and z of its frame, the first about x."""
+    rows, robot = job.programs[0].robots[ROBOT], job.frame.robot(ROBOT)
+    positions = {
+        name: {
+            number: np.array([float(part) for part in fields.split(",")])
+            for number, fields in re.findall(r"C(\d{5})=(\S+)", text)
+        }
+        for name, text in files.items()
+    }
+    points = dict(re.findall(r"(MOV[JLC] C\d{5})( )", files["SEAM.JBI"]))
+    assert len(points) == 7
+    for name, X_WC, first, row in (
+        ("ALPHA.JBI", np.eye(4), "00000", 0),
+        ("SEAM.JBI", X_WP, "00000", 1),
+        ("SEAM.JBI", X_WP, "00001", 2),
+        ("SEAM.JBI", X_WP, "00002", 3),
+        ("SEAM.JBI", X_WP, "00004", 4),
+        ("SEAM.JBI", X_WP, "00005", 5),
+    ):
+        numbers = positions[name][first]
+        R = np.eye(3)
+        for axis, angle in zip(TURNS, np.deg2rad(numbers[3:]), strict=True):
+            R = rotation_exp(angle * axis) @ R
+        X = X_WC @ pose_from(R, numbers[:3] / 1000.0)
+        np.testing.assert_allclose(X, tip(robot, rows.q[row]), rtol=0.0, atol=1e-5)
+
+
+def test_a_seam_has_few_statements_and_the_process_stands_at_its_ends(files: dict[str, str]) -> None:
+    statements = files["SEAM.JBI"].partition("NOP\r\n")[2].split("\r\n")
+
+    assert [re.sub(r"C\d{5}", "C", line) for line in statements] == [
+        statements[0].replace("C00000", "C"),
+        "MOVL C V=50.0 PL=0",
+        "ARCON ASF#(1)",
+        "WVON WEV#(1)",
+        "MOVL C V=8.0 PL=1",
+        "MOVC C V=8.0 PL=1",
+        "MOVC C V=8.0 PL=1",
+        "MOVC C V=8.0 PL=0",
+        "WVOF",
+        "ARCOF AEF#(1)",
+        "MOVL C V=50.0 PL=0",
+        "END",
+        "",
+    ]
+
+
+def test_joints_follow_from_a_pose_and_its_configuration(job: ExportJob) -> None:
+    robot = job.frame.robot(ROBOT)
+    rng = np.random.default_rng(3)
+    q = rng.uniform(0.9 * np.maximum(robot.model.lower, -np.pi), 0.9 * np.minimum(robot.model.upper, np.pi), (200, 6))
+    poses, stated = ScrewChain(robot).tool_poses(q), configuration(robot, q)
+    again = [joints_of(robot, X, row) for X, row in zip(poses, stated, strict=True)]
+
+    off = [np.inf if other is None else np.abs(other - one).max() for one, other in zip(q, again, strict=True)]
+
+    assert len({tuple(row) for row in stated.tolist()}) == 8
+    assert (
+        np.mean(np.array(off) < 1e-6) > 0.9
+    )  # of two whole turns of an axis that it may make, the configuration tells one only
+    for one, other in zip(q, again, strict=True):
+        if other is not None:
+            np.testing.assert_allclose(tip(robot, other), tip(robot, one), atol=1e-6)
+
+
+CHANGES = {
+    "feed": ("SEAM.JBI", "C00002 V=8.0", "C00002 V=9.0"),
+    "user frame": ("SEAM.JBI", "///USER 2", "///USER 3"),
+    "frame of the job": ("SEAM.JBI", "///FRAME USER 2", "///FRAME USER 3"),
+    "tool": ("SEAM.JBI", "///TOOL 1", "///TOOL 2"),
+    "wrist": ("SEAM.JBI", "///RCONF 1,", "///RCONF 0,"),
+    "elbow": ("SEAM.JBI", r"(///RCONF \d),0", r"\1,1"),
+    "half turn": ("SEAM.JBI", r"(///RCONF \d,\d,\d),0", r"\1,1"),
+    "point 0.2 mm off": ("SEAM.JBI", r"C00002=100\.000", "C00002=100.200"),
+    "on and off": ("SEAM.JBI", r"ARCON ASF#\(1\)", "ARCOF AEF#(1)"),
+    "weave that never ends": ("SEAM.JBI", "WVOF\r\n", ""),
+    "no weave": ("SEAM.JBI", r"WVON WEV#\(1\)\r\n", ""),
+    "another weave": ("SEAM.JBI", r"WEV#\(1\)", "WEV#(2)"),
+    "another condition": ("SEAM.JBI", r"ASF#\(1\)", "ASF#(2)"),
+    "rounded end": ("SEAM.JBI", r"(MOVC C00005 V=8\.0) PL=0", r"\1 PL=1"),
+    "stop within": ("SEAM.JBI", r"(MOVL C00002 V=8\.0) PL=1", r"\1 PL=0"),
+    "larger level": ("SEAM.JBI", r"(MOVL C00002 V=8\.0) PL=1", r"\1 PL=8"),
+    "number of positions": ("SEAM.JBI", "///NPOS 7", "///NPOS 6"),
+    "no end": ("SEAM.JBI", "END\r\n", ""),
+    "position used twice": ("SEAM.JBI", "MOVL C00002", "MOVL C00001"),
+    "line for an arc": ("SEAM.JBI", "MOVC C00004", "MOVL C00004"),
+    "joints for a line": ("SEAM.JBI", r"MOVL C00006 V=50\.0", "MOVJ C00006 VJ=50.00"),
+    "another job": ("ALPHA.JBI", "CALL JOB:SEAM", "CALL JOB:BEAM"),
+    "no call": ("ALPHA.JBI", "CALL JOB:SEAM\r\n", ""),
+    "a jump": ("ALPHA.JBI", "CALL JOB:SEAM\r\n", "JUMP *A\r\nCALL JOB:SEAM\r\n"),
+    "home": ("ALPHA.JBI", r"C00000=(-?\d+)\.(\d)", r"C00000=\1.9\2"),
+    "pulses": ("ALPHA.JBI", "///POSTYPE ROBOT", "///POSTYPE PULSE"),
+    "another group": ("SEAM.JBI", "///GROUP1 RB1", "///GROUP1 RB2"),
+    "a name": ("SEAM.JBI", "//NAME SEAM", "//NAME BEAM"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_change_of_a_file_is_noticed(change: str, job: ExportJob, files: dict[str, str]) -> None:
+    name, pattern, repl = CHANGES[change]
+    text, count = re.subn(pattern, repl, files[name], count=1)
+    assert count == 1
+    assert text != files[name]
+
+    try:
+        read = INFORM.read(job.frame, files | {name: text})
+        finding = next(other_rows(INFORM, job, read), "")
+        if not finding:
+            executed_programs(job, INFORM, [run_of(job)], read)
+    except (InputError, NotVerifiedError) as error:
+        finding = str(error)
+
+    assert finding
+
+
+@pytest.mark.parametrize(
+    ("stated", "message"),
+    [
+        (
+            {"tool_number": None},
+            "robots.alpha.controller.tool_number: expected the number of its tool on the controller",
+        ),
+        ({"tool_number": 64}, "robots.alpha.controller.tool_number: expected the number of its tool on the controller"),
+    ],
+)
+def test_numbers_that_are_missing_are_named(stated: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError) as error:
+        INFORM.render(inform_job(**stated))
+    assert "robots.alpha.controller.tool_number: expected the number of its tool on the controller" in str(error.value)
+    assert message in str(error.value)
+
+
+def test_a_corner_that_only_a_small_zone_could_round_is_refused() -> None:
+    job = seam_job("yaskawa", process=ARC, control={"tool_number": 1, "frames": (2,)}, number=2)
+    with pytest.raises(NotVerifiedError, match="task 'seam': row 4: a corner in process"):
+        INFORM.render(job)
