@@ -49,7 +49,7 @@ def write_cell(file: Path, *, first: str, second: str) -> Path:
         second=second,
         decimals=DECIMALS,
         tasks=", tasks: {T_ROB1: ROB_1}" if is_abb else "",
-        task=", task: T_ROB1" if is_abb else "",
+        task=", task: T_ROB1" if is_abb else ", tool_number: 1" if second == "yaskawa" else "",
         output="doThere" if is_abb else 1,
         entry="diGo" if is_abb else 2,
     )

@@ -153,7 +153,7 @@ def test_formats_that_do_not_exist_are_refused_with_those_that_do(
     status, lines = check_for(cells / "in_turn.yaml", "rapidd", capsys)
 
     assert (status, len(lines)) == (2, 1)
-    assert lines[0].startswith("error: --for: expected one of csv, fanuc_ls, json, krl, rapid, ros2, ")
+    assert lines[0].startswith("error: --for: expected one of csv, fanuc_ls, inform, json, krl, rapid, ros2, ")
     assert lines[0].endswith("got 'rapidd', did you mean 'rapid'?")
 
 

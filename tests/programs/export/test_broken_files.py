@@ -26,6 +26,7 @@ pytestmark = pytest.mark.usefixtures("stored_solutions")
 FORMATS = ("csv", "json", "ros2", "stream", "wide")  # those that the small cell can be exported in
 MAKERS = {
     "fanuc_ls": ("kuka", "fanuc"),
+    "inform": ("kuka", "yaskawa"),
     "krl": ("kuka", "abb"),
     "rapid": ("kuka", "abb"),
     "val3": ("staubli", "ur"),
@@ -148,7 +149,7 @@ def test_no_broken_program_of_a_maker_is_verified_whose_digest_fits(
 
 
 @pytest.mark.parametrize(
-    "form", [*QUICK, *(pytest.param(form, marks=pytest.mark.slow) for form in ("fanuc_ls", "krl", "rapid"))]
+    "form", [*QUICK, *(pytest.param(form, marks=pytest.mark.slow) for form in ("fanuc_ls", "inform", "krl", "rapid"))]
 )
 def test_untouched_programs_of_a_maker_are_verified(form: str, programs: Programs) -> None:
     folder, run = programs(form)

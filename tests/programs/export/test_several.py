@@ -38,7 +38,7 @@ def test_all_formats_are_written_or_refused_with_the_reason(all_of: tuple[Export
     refused = {entry.form: str(entry.refusal) for entry in all_of if entry.refusal is not None}
 
     assert [entry.form for entry in all_of] == list(EXPORTERS)
-    assert set(refused) == {"fanuc_ls", "krl", "rapid", "urscript", "val3"}
+    assert set(refused) == {"fanuc_ls", "inform", "krl", "rapid", "urscript", "val3"}
     for form, reason in refused.items():
         assert reason.splitlines() == [
             f"robots.{robot}.controller: expected the controller that plays {form}, got none"

@@ -27,7 +27,7 @@ from cellplan.programs.formats.inform.text import COMMENT, MOST
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 DECIMALS: Final = 3  # of a millimetre; degrees have one more
-FOUND_AGAIN: Final = 1e-4  # [rad] within which a pose and a configuration must give the joints that are meant
+SAME_JOINTS: Final = 1e-4  # [rad] within which a pose and a configuration must give the joints that are meant
 PASSED: Final = "PL=1"
 STOP: Final = "PL=0"
 SHARES: Final = (LARGEST_SHARE, 0.0)  # PL=1 and PL=0: how far a position level rounds is set at each controller
@@ -149,11 +149,11 @@ class _RobotWriter:
             before = move
 
     def _joint_motion(self, job: _Job, move: Move) -> str:
-        """A motion of joints, to a pose from which they are found again."""
+        """A motion of joints, to a pose from which they are solved again."""
         robot, q, stated = self.part.placed, self.rows.q[move.row], self.configurations[move.row]
         X_WT = ScrewChain(robot).tool_poses(q[None])[0]
-        found = joints_of(robot, X_WT, stated)
-        if stated[REAR] or found is None or np.abs(found - q).max() > FOUND_AGAIN:
+        solved = joints_of(robot, X_WT, stated)
+        if stated[REAR] or solved is None or np.abs(solved - q).max() > SAME_JOINTS:
             reason = "the wrist is behind axis S" if stated[REAR] else "the wrist is straight, or an axis on an edge"
             raise NotVerifiedError(
                 [
