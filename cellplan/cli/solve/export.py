@@ -32,8 +32,8 @@ class ExportOptions(Options):
         tuple[str, ...],
         option(
             "--format NAME",
-            "Format: csv, json or ros2 for any controller; fanuc_ls, inform, krl, rapid, urscript or val3 for those of a "
-            "maker; stream: rows at the cycle of each controller; wide: one table of all robots. May be repeated; all: "
+            "Format: csv, json or ros2 for any controller; fanuc_ls, inform, krl, rapid, urscript or val3 for those of "
+            "a maker; stream: rows at the cycle of each controller; wide: one table of all robots. May be repeated; all: "
             "every one that can take the run.",
             autocompletion=one_of("cellplan.programs.dialects:DIALECTS", "wide", "all"),
         ),
