@@ -33,8 +33,8 @@ class ExportOptions(Options):
         option(
             "--format NAME",
             "Format: csv, json or ros2 for any controller; fanuc_ls, inform, krl, rapid, urscript or val3 for those of "
-            "a maker; stream: rows at the cycle of each controller; wide: one table of all robots. May be repeated; all: "
-            "every one that can take the run.",
+            "a maker; stream: rows at the cycle of each controller; wide: one table of all robots. May be repeated; "
+            "all: every one that can take the run.",
             autocompletion=one_of("cellplan.programs.dialects:DIALECTS", "wide", "all"),
         ),
     ]
