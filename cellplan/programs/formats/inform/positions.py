@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.cell.cell import Robot
 from cellplan.programs.elements.wrist import sides_at_zero, wrist_sides
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.kinematics.spherical_wrist import SphericalWristArm
 
 STATED: Final = 6  # numbers of a configuration that have a meaning
@@ -40,6 +41,12 @@ def configuration(robot: Robot, q: Array) -> NDArray[np.int_]:
     quarter = np.mod(angles[:, 0] + 90.0, 360.0)
     is_flip = (quarter > 0.0) & (quarter <= 180.0)
     return np.column_stack([~is_flip, sides[:, 1], sides[:, 0], (angles <= -180.0) | (angles > 180.0)]).astype(int)
+
+
+def tool_pose(robot: Robot, q: Array) -> Array:
+    """The tool of a robot in the world in [m], shape (4, 4), for joints in [rad], shape (6,)."""
+    pose: Array = ScrewChain(robot).tool_poses(q[None])[0]
+    return pose
 
 
 def joints_of(robot: Robot, X_WT: Array, stated: NDArray[np.int_]) -> Array | None:

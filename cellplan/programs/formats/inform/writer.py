@@ -21,10 +21,9 @@ from cellplan.programs.elements.paced import Events, Move, blocks, moves_of
 from cellplan.programs.elements.pages import PagedProgram, paged, robots_of
 from cellplan.programs.elements.text import ascii_text, comment, fixed, joined
 from cellplan.programs.formats.inform.jobs import KIND, JobFrame, demands, inform_events, job_names, speed_text
-from cellplan.programs.formats.inform.positions import REAR, STATED, WIDTH, configuration, joints_of
+from cellplan.programs.formats.inform.positions import REAR, STATED, WIDTH, configuration, joints_of, tool_pose
 from cellplan.programs.formats.inform.reader import read_inform
 from cellplan.programs.formats.inform.text import COMMENT, MOST
-from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 DECIMALS: Final = 3  # of a millimetre; degrees have one more
 SAME_JOINTS: Final = 1e-4  # [rad] within which a pose and a configuration must give the joints that are meant
@@ -151,7 +150,7 @@ class _RobotWriter:
     def _joint_motion(self, job: _Job, move: Move) -> str:
         """A motion of joints, to a pose from which they are solved again."""
         robot, q, stated = self.part.placed, self.rows.q[move.row], self.configurations[move.row]
-        X_WT = ScrewChain(robot).tool_poses(q[None])[0]
+        X_WT = tool_pose(robot, q)
         solved = joints_of(robot, X_WT, stated)
         if stated[REAR] or solved is None or np.abs(solved - q).max() > SAME_JOINTS:
             reason = "the wrist is behind axis S" if stated[REAR] else "the wrist is straight, or an axis on an edge"
@@ -181,7 +180,7 @@ class _RobotWriter:
         if row > seam.first and X_PT is not None:
             X = X_PT[row]
         else:
-            X = inverse(job.frame.X_WC) @ ScrewChain(self.part.placed).tool_poses(q[None])[0]
+            X = inverse(job.frame.X_WC) @ tool_pose(self.part.placed, q)
         return job.position(X, self.configurations[row].tolist())
 
 
