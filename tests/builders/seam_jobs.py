@@ -34,6 +34,7 @@ KUKA_ZERO = ControllerZero(  # stretched forward
 VALVE = {"on": ["$OUT[6]=TRUE", "$OUT[7]=TRUE"], "off": ["$OUT[7]=FALSE", "$OUT[6]=FALSE"]}  # of a KUKA arm
 UR_VALVE = {"on": "set_digital_out(3,True)", "off": "set_digital_out(3,False)"}
 STAUBLI_VALVE = {"on": ["doGas=true", "doArc=true"], "off": ["doArc=false", "doGas=false"]}
+ARC_AND_WEAVE = {"on": ["ARCON ASF#(1)", "WVON WEV#(1)"], "off": ["WVOF", "ARCOF AEF#(1)"]}  # of a Yaskawa arm
 SEAM = Seam(task=TASK, first=1, last=6)  # approach; start, corner, through the arc, end; retract
 
 
@@ -105,6 +106,15 @@ def seam_job(
         stations={ROBOT: (station,)},
     )
     return ExportJob(frame=frame, programs=(ProgramRows(name=None, robots={ROBOT: rows}),))
+
+
+def inform_job(**stated: object) -> ExportJob:
+    """The job of a Yaskawa arm; the corner between its lines may be rounded over half of them."""
+    job = seam_job("yaskawa", process=ARC_AND_WEAVE, control={"tool_number": 1, "frames": (2,)} | stated, number=2)
+    rows = job.programs[0].robots[ROBOT]
+    assert rows.rounding is not None
+    rounded = replace(rows, rounding=np.where(rows.rounding > 0.0, 0.5, 0.0))
+    return replace(job, programs=(replace(job.programs[0], robots={ROBOT: rounded}),))
 
 
 def run_of(job: ExportJob, *, steps: int = 40) -> ProgramRows:

@@ -1,12 +1,11 @@
 """INFORM: jobs with seams are read back as they were, and every change of a file is noticed."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from builders.elbow_arm import tip
-from builders.seam_jobs import ROBOT, SEAM, X_WP, run_of, seam_job
+from builders.seam_jobs import ARC_AND_WEAVE, ROBOT, SEAM, X_WP, inform_job, run_of, seam_job
 
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.geometry.transforms import pose_from, rotation_exp
@@ -17,17 +16,7 @@ from cellplan.programs.judgement.compare_rows import other_rows
 from cellplan.programs.seams.executed import executed_programs
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
-ARC = {"on": ["ARCON ASF#(1)", "WVON WEV#(1)"], "off": ["WVOF", "ARCOF AEF#(1)"]}
 TURNS = np.eye(3)
-
-
-def inform_job(**stated: object) -> ExportJob:
-    """The job of a yaskawa arm; the corner between its lines may be rounded over half of them."""
-    job = seam_job("yaskawa", process=ARC, control={"tool_number": 1, "frames": (2,)} | stated, number=2)
-    rows = job.programs[0].robots[ROBOT]
-    assert rows.rounding is not None
-    rounded = replace(rows, rounding=np.where(rows.rounding > 0.0, 0.5, 0.0))
-    return replace(job, programs=(replace(job.programs[0], robots={ROBOT: rounded}),))
 
 
 @pytest.fixture(scope="module")
@@ -190,6 +179,6 @@ def test_numbers_that_are_missing_are_named(stated: dict[str, object], message: 
 
 
 def test_a_corner_that_only_a_small_zone_could_round_is_refused() -> None:
-    job = seam_job("yaskawa", process=ARC, control={"tool_number": 1, "frames": (2,)}, number=2)
+    job = seam_job("yaskawa", process=ARC_AND_WEAVE, control={"tool_number": 1, "frames": (2,)}, number=2)
     with pytest.raises(NotVerifiedError, match="task 'seam': row 4: a corner in process"):
         INFORM.render(job)

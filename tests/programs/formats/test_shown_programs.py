@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from builders.seam_jobs import KUKA_ZERO, STAUBLI_VALVE, UR_VALVE, VALVE, seam_job
+from builders.seam_jobs import KUKA_ZERO, STAUBLI_VALVE, UR_VALVE, VALVE, inform_job, seam_job
 from builders.shown_jobs import (
     NAMES,
     NUMBERS,
@@ -33,6 +33,7 @@ PAGES: dict[str, Shown] = {
         (waiting_fanucs(), ["WELD.ls"]),
         (welded_seam(), ["ALPHA_WORK_OF_ALPHA.ls"]),
     ],
+    "inform": [(inform_job(), ["SEAM.JBI"])],
     "json": [(timed_table(), ["program.json"])],
     "krl": [
         (waiting_arms("kuka", NUMBERS), ["weld.src", "weld.dat"]),
