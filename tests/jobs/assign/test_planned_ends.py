@@ -10,7 +10,7 @@ from cellplan.jobs.assign.assign import assign
 from cellplan.jobs.assign.draft import AssignmentDraft
 
 OPEN = Path(__file__).resolve().parents[3] / "examples" / "open_tasks" / "open_frame.yaml"
-ROUNDING = 1e-9  # [rad] tables have twelve decimals of a degree
+ACCURACY = 1e-6  # [rad] `solve` keeps tools within a micrometre: two plans of one task differ by as much at a metre
 
 
 @pytest.mark.slow
@@ -26,7 +26,7 @@ def test_tools_with_a_free_spin_leave_their_tasks_where_the_model_has_them(tmp_p
     for run, (_, stop) in zip(works, result.sequenced.stops, strict=True):
         for end in (it for it in stop if it is not None):
             left = run.motion.q[-1, result.cell.columns(end.mode.robot)]
-            assert np.abs(left - end.end).max() < ROUNDING
+            assert np.abs(left - end.end).max() < ACCURACY
             turned.append(np.abs(left - end.mode.q[0 if end.is_reversed else -1]).max())
     assert max(turned) > 0.01
     assert result.passed

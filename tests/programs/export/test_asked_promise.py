@@ -69,7 +69,7 @@ def test_a_promise_that_is_not_kept_is_not_replaced_by_a_lesser_one(folder: Path
     status, _, error = export(folder, "--format urscript", "--promise timed", "--robot right", "-o timed")
     assert (status, error) == (0, "")
     status, _, error = export(folder, "--format val3", "--promise timed")
-    assert (status, error) == (2, "error: --promise: expected sequence only with val3, got timed\n")
+    assert (status, error) == (2, "error: --promise: expected paced, sequence only with val3, got timed\n")
     status, _, error = export(folder, "--format val3", "--promise best")
     assert (status, error) == (
         2,
