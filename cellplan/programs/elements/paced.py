@@ -129,7 +129,8 @@ def moves_of(job: ExportJob, program: ProgramRows, events: Events) -> tuple[Move
             raise NotVerifiedError(
                 [
                     f"task '{seam.task}': row {row + 1}: a corner in process that no zone within its tolerance rounds "
-                    "would be a stop, which ends the process: allow more (tolerance), or divide the task there"
+                    "would be a stop, which ends the process: divide the task there, write joints (--moves joints), "
+                    "or, where zones have sizes, allow more (tolerance)"
                 ]
             )
         moves.append(
