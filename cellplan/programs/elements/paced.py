@@ -20,6 +20,7 @@ from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps,
 from cellplan.programs.elements.process import ProcessForm
 
 Which = Literal["on", "inner", "off"]
+Refuse = Callable[[str, str | None], NoReturn]  # raises that something is expected, and what is there instead
 NO_SHAPE: Final = 1e-7  # [m] moves that are shorter are not rounded
 
 
@@ -32,6 +33,7 @@ class Switches(NamedTuple):
 
 
 NOTHING: Final = Switches()
+EVERY_SWITCH: Final = tuple(Switches(*flags) for flags in product((False, True), repeat=3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,12 +98,16 @@ class Events:
         has_handshake = has_marks and bool(handshake_steps(self.frame, self.robot))
         return (self.signal(lowering_step(self.frame, self.robot)),) if has_handshake else ()
 
+    def knows(self, task: str | None, text: str) -> bool:
+        """Whether a statement is one that may stand between moves of a task, or before the first one."""
+        texts = {text for switches in EVERY_SWITCH for text in self.texts(task, switches)}
+        return self.plain(text) in map(self.plain, texts | {*self.before(True)})
+
     def read(self, task: str | None, texts: Sequence[str]) -> Switches | None:
         """What some statements between two moves mean; None where they are no such statements."""
         stated = tuple(map(self.plain, texts))
-        for flags in product((False, True), repeat=3):
-            switches = Switches(*flags)
-            if tuple(map(self.plain, self.texts(task, switches))) == stated and (any(stated) or not any(flags)):
+        for switches in EVERY_SWITCH:
+            if tuple(map(self.plain, self.texts(task, switches))) == stated and (any(stated) or not any(switches)):
                 return switches
         return None
 
@@ -198,7 +204,7 @@ class ReadMove:
         configurations: Configuration of each, as the format counts it; None where it states none.
     """
 
-    refuse: Callable[[str, str | None], NoReturn]
+    refuse: Refuse
     task: str | None
     q: Array
     poses: tuple[Array, ...] = ()
@@ -209,15 +215,21 @@ class ReadMove:
     process: Which | None = None
 
 
-def rows_of_moves(events: Events, moves: Sequence[ReadMove], between: Sequence[Sequence[str]]) -> RobotRows:
-    """Rows of a program that was read: its moves, and the statements after each of them.
+def rows_of_moves(
+    events: Events, moves: Sequence[ReadMove], between: Sequence[Sequence[str]], *, begin: Refuse | None = None
+) -> RobotRows:
+    """Rows of a program that was read: its moves, and the statements before the first and after each of them.
 
-    An ``InputError`` has file and line.
+    An ``InputError`` has file and line; ``begin`` raises that of the first statement, where it is not the first move.
     """
-    rows = _RowsOfMoves(events)
-    for move, texts in zip(moves, between, strict=True):
-        rows.add(move, texts)
-    return rows.finished(moves)
+    state = _RowsOfMoves(events)
+    for move, texts in zip(moves, between[1:], strict=True):
+        state.add(move, texts)
+    rows = state.finished(moves)
+    if [*map(events.plain, between[0])] != [*map(events.plain, events.before(bool(rows.marks)))]:
+        expected = "before the first move the output of the robot lowered where it waits, and nothing else"
+        (begin or moves[0].refuse)(expected, between[0][0] if between[0] else "none")
+    return rows
 
 
 class _RowsOfMoves:
@@ -251,8 +263,9 @@ class _RowsOfMoves:
             move.refuse("a rounded row, as a stop ends its process", None)
         if (off and not is_on) or (on and is_on):
             move.refuse(f"a process that is {'on' if off else 'off'} before", "the other")
-        if (off or on) and (move.zone > 0.0 or move.share > 0.0):
-            move.refuse("a stop where a process goes on or off", "a rounded row")
+        is_stop = off or on or switches.waits or not self._rows
+        if is_stop and (move.zone > 0.0 or move.share > 0.0):
+            move.refuse("a stop where a process goes on or off, robots wait or a program begins", "a rounded row")
         self._take(move)
         if switches.waits:
             self._marks.append(len(self._rows) - 1)

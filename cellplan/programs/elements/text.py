@@ -4,7 +4,7 @@ import re
 import unicodedata
 from collections.abc import Collection, Iterable, Mapping
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, NoReturn
 
 from cellplan.errors import InputError
 
@@ -79,6 +79,10 @@ class Statement(NamedTuple):
     def error(self, expected: str, got: str | None = None) -> InputError:
         """The error that something else is expected here."""
         return line_error(self.file, self.line, expected, self.text if got is None else got)
+
+    def refuse(self, expected: str, got: str | None = None) -> NoReturn:
+        """Raise the error that something else is expected here."""
+        raise self.error(expected, got)
 
     def read_by(self, patterns: Mapping[str, re.Pattern[str]]) -> "Statement":
         """The same with its kind and words, by the one of the patterns that it follows."""

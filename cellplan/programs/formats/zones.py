@@ -5,6 +5,7 @@ the distance of its tip from the row when the share is left to go.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -14,7 +15,7 @@ from cellplan.geometry.transforms import Array, rotation_about
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import RobotRows
 from cellplan.programs.elements.corners import LARGEST_SHARE
-from cellplan.programs.elements.paced import Move
+from cellplan.programs.elements.paced import Move, ReadMove
 
 HALVINGS: Final = 24  # of the search for a share, to 3e-8
 STANDS: Final = 1e-9  # [rad] or [m] axes that move less in a segment do not count
@@ -76,6 +77,19 @@ def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
             low, high = np.where(near, middle, low), np.where(near, high, middle)
         shares[rows] = np.maximum(shares[rows], np.where(inside, LARGEST_SHARE, high))
     return shares
+
+
+def with_shares(robot: Robot, moves: Sequence[ReadMove], zones: Sequence[float]) -> list[ReadMove]:
+    """Moves that were read, those of joints with the shares of zones that are stated by the distance of the tool.
+
+    Zones are in [m], shape (N,), 0 for a stop and for lines and arcs, whose own zones stay. ``InputError`` has file and
+    line where a motion of joints beside a seam is no stop.
+    """
+    shares = tool_shares(robot, np.array([move.q for move in moves]), np.array(zones)).tolist()
+    for place, (move, zone) in enumerate(zip(moves, zones, strict=True)):
+        if zone > 0.0 and any(other.poses for other in moves[max(place - 1, 0) : place + 2]):
+            move.refuse("a stop beside a seam", "a rounded row")
+    return [move if move.poses else replace(move, share=share) for move, share in zip(moves, shares, strict=True)]
 
 
 def axis_zones(robot: Robot, q: Array, share: Array | float) -> Array:

@@ -136,6 +136,7 @@ CHANGES = {
     "another job": ("ALPHA.JBI", "CALL JOB:SEAM", "CALL JOB:BEAM"),
     "no call": ("ALPHA.JBI", "CALL JOB:SEAM\r\n", ""),
     "a jump": ("ALPHA.JBI", "CALL JOB:SEAM\r\n", "JUMP *A\r\nCALL JOB:SEAM\r\n"),
+    "first motion rounded": ("ALPHA.JBI", r"(MOVJ C00000 VJ=10\.00) PL=0", r"\1 PL=1"),
     "home": ("ALPHA.JBI", r"C00000=(-?\d+)\.(\d)", r"C00000=\1.9\2"),
     "pulses": ("ALPHA.JBI", "///POSTYPE ROBOT", "///POSTYPE PULSE"),
     "another group": ("SEAM.JBI", "///GROUP1 RB1", "///GROUP1 RB2"),

@@ -140,7 +140,7 @@ SOURCE: dict[str, tuple[str, str, str]] = {  # what is replaced once, what by, a
     "no mode": ("$ORI_TYPE=#VAR\r\n", "", "expected $ORI_TYPE=#VAR to be set"),
     "line for the arc": ("CIRC seam_3,seam_4", "LIN seam_3\r\nLIN seam_4", "as a stop ends its process"),
     "arc turned round": ("CIRC seam_3,seam_4", "CIRC seam_4,seam_3", "read a pose that is"),
-    "joints to a pose": ("LIN seam_2 C_DIS", "PTP seam_2", "no motion of the joints behind a line"),
+    "joints to a pose": ("LIN seam_2 C_DIS", "PTP seam_2", "a point that is declared for such a motion"),
     "line to joints": ("PTP XP2", "LIN XP2", "behind $BASE and $VEL.CP"),
     "spline": ("LIN seam_2 C_DIS", "SLIN seam_2", "a statement that these programs have"),
     "point left out": ("LIN seam_2 C_DIS\r\n", "", "expected"),

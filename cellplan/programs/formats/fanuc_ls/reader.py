@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Final, NoReturn
+from typing import Final
 
 import numpy as np
 
@@ -83,11 +83,10 @@ def _waiting(player: TpPlayer, group: MotionGroup) -> RobotRows:
         elif switches is not None:
             is_on = (is_on and not switches.off) or switches.on
     moves = list(_within_halves(moves))
-    rows = rows_of_moves(events, moves, [[one.text for one in motion.behind] for motion in player.motions])
-    before, expected = [statement.text for statement in player.before], events.before(bool(rows.marks))
-    if list(map(events.plain, before)) != list(map(events.plain, expected)):
-        first = (*player.before, player.motions[0].statement)[0]
-        raise first.error(f"{expected[0] if expected else 'no handshake'} before the first motion")
+    between = [player.before, *(motion.behind for motion in player.motions)]
+    texts = [[one.text for one in statements] for statements in between]
+    begin = (*player.before, player.motions[0].statement)[0].refuse
+    rows = rows_of_moves(events, moves, texts, begin=begin)
     return rows if player.frame.promise is Promise.PACED else replace(rows, process=None)
 
 
@@ -104,9 +103,6 @@ def _read_move(events: Events, group: MotionGroup, motion: TpMotion, *, in_proce
     """A motion as it was found; what stands behind it is refused where it stands."""
     at = (*motion.behind, motion.statement)[0]
 
-    def refuse(expected: str, got: str | None = None) -> NoReturn:
-        raise at.error(expected, got)
-
     poses = [point.poses[group.number] for point in motion.points] if motion.feed is not None else []
     feed = motion.feed
     if feed is not None and np.isnan(feed):
@@ -114,7 +110,7 @@ def _read_move(events: Events, group: MotionGroup, motion: TpMotion, *, in_proce
             raise motion.statement.error("the speed of the tool in mm/sec", WELD_SPEED)
         feed = events.frame.cell.task(motion.task).feed
     return ReadMove(
-        refuse=refuse,
+        refuse=at.refuse,
         task=motion.task,
         q=_joints(group, motion),
         poses=tuple(CONVENTIONS[KIND].pose(np.array(pose.values[:ARM])) for pose in poses),

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Final, NamedTuple, NoReturn
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -67,9 +67,7 @@ class _RobotReader:
         events = inform_events(self._frame, self._robot.name)
         if not self._moves:
             raise job.end.error("at least two motions", "none")
-        rows = rows_of_moves(events, self._moves, self._between[1:])
-        if tuple(map(events.plain, self._between[0])) != tuple(map(events.plain, events.before(bool(rows.marks)))):
-            raise job.end.error("before the first motion what lowers its output, where robots wait for one another")
+        rows = rows_of_moves(events, self._moves, self._between)
         return replace(rows, process=None) if self._frame.promise is Promise.SEQUENCE_ONLY else rows
 
     def _follow(
@@ -88,14 +86,11 @@ class _RobotReader:
         statement, end = motion.statement, motion.positions[-1]
         is_joint = statement.kind == "MOVJ"
 
-        def refuse(expected: str, got: str | None) -> NoReturn:
-            raise statement.error(expected, got)
-
         q = joints_of(self._robot, frame.X_WC @ end.X, end.stated) if is_joint else np.full(len(end.stated), np.nan)
         if q is None:
             raise end.statement.error(f"a position that the arm reaches in its configuration {end.stated.tolist()}")
         return ReadMove(
-            refuse=refuse,
+            refuse=statement.refuse,
             task=task,
             q=q,
             poses=() if is_joint else tuple(position.X for position in motion.positions),

@@ -1,10 +1,9 @@
 """Strict reader of KRL with seams: what is written, and harmless variants of it, nothing else."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
-from typing import Final, NoReturn, TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.report.exported import ExportFrame, ProgramRows, RobotRows
 from cellplan.model.units import MM
 from cellplan.programs.elements.joints import Axes, from_numbers
-from cellplan.programs.elements.paced import Events, ReadMove, Switches, rows_of_moves
+from cellplan.programs.elements.paced import Events, ReadMove, rows_of_moves
 from cellplan.programs.elements.pages import read_programs
 from cellplan.programs.elements.text import Statement
 from cellplan.programs.formats.krl.axes import order_of_axes
@@ -152,7 +151,7 @@ class _Player:
     events: Events
     task: str | None = None  # of the routine that is followed
     moves: list[ReadMove] = field(default_factory=list)
-    between: list[list[Statement]] = field(default_factory=lambda: [[]])
+    between: list[list[str]] = field(default_factory=lambda: [[]])
     used: set[str] = field(default_factory=set)
     settings: dict[str, float] = field(default_factory=dict)  # speeds and zones of the routine that is followed
     setup: list[str] = field(default_factory=list)  # what was set before the first motion
@@ -188,12 +187,9 @@ class _Player:
 
     def _take(self, statement: Statement) -> None:
         """A statement of a process or of a handshake."""
-        flags = product((False, True), repeat=3)
-        texts = {text for one in flags for text in self.events.texts(self.task, Switches(*one))}
-        known = set(map(self.events.plain, {*texts, *self.events.before(True)}))
-        if self.events.plain(statement.text) not in known:
+        if not self.events.knows(self.task, statement.text):
             raise statement.error("a statement that these programs have")
-        self.between[-1].append(statement)
+        self.between[-1].append(statement.text)
 
     def _set(self, statement: Statement) -> None:
         """What is set once, before the first motion."""
@@ -239,8 +235,6 @@ class _Player:
 
     def _joint_move(self, statement: Statement) -> ReadMove:
         """A motion of the joints to a point."""
-        if self.moves and self.task is not None and self.moves[-1].task == self.task and self.moves[-1].poses:
-            raise statement.error("no motion of the joints behind a line in a routine")
         if "VEL_PTP" not in self.settings:
             raise statement.error("a speed of the joints before")
         values = self._point(statement, 0, self.data.joints)
@@ -253,7 +247,7 @@ class _Player:
         if is_rounded and "CPTP" not in self.settings:
             raise statement.error("$APO.CPTP to be set before C_PTP")
         share = self.settings["CPTP"] / WHOLE if is_rounded else 0.0
-        return ReadMove(refuse=_refusal(statement), task=self.task, q=from_numbers(placed, written)[0], share=share)
+        return ReadMove(refuse=statement.refuse, task=self.task, q=from_numbers(placed, written)[0], share=share)
 
     def _tool_move(self, statement: Statement) -> ReadMove:
         """A line or an arc of the tool."""
@@ -272,7 +266,7 @@ class _Player:
         q = from_numbers(placed, written)[0]
         q[list(axes.arm)] = np.nan
         return ReadMove(
-            refuse=_refusal(statement),
+            refuse=statement.refuse,
             task=self.task,
             q=q,
             poses=tuple(pose.X for pose in poses),
@@ -296,24 +290,9 @@ class _Player:
                 raise line.error("points that are used", name.upper())
         if not self.moves:
             raise end.error("at least one motion", "none")
-        texts = [[statement.text for statement in statements] for statements in self.between]
-        rows = rows_of_moves(self.events, self.moves, texts[1:])
-        expected = [*map(self.events.plain, self.events.before(bool(rows.marks)))]
-        if [*map(self.events.plain, texts[0])] != expected:
-            at = self.between[0][0] if self.between[0] else end
-            raise at.error("the output of the robot lowered before the first motion where it waits, and nothing else")
-        return rows
+        return rows_of_moves(self.events, self.moves, self.between)
 
 
 def _is_setting(statement: Statement) -> bool:
     """Whether a statement sets what is set once."""
     return statement.kind in {"TOOL", "BASE", "ADVANCE"} or re.sub(r"\s+", "", statement.text.upper()) in SETUP
-
-
-def _refusal(statement: Statement) -> Callable[[str, str | None], NoReturn]:
-    """What refuses a statement."""
-
-    def refuse(expected: str, got: str | None) -> NoReturn:
-        raise statement.error(expected, got)
-
-    return refuse

@@ -205,11 +205,7 @@ class PacedReader:
             moves.append(move)
             tasks.append(task)
             between.append([])
-        rows = rows_of_moves(self._events, [*self._with_joints(moves, tasks)], between[1:])
-        expected = tuple(map(self._events.plain, self._events.before(bool(rows.marks))))
-        if tuple(map(self._events.plain, between[0])) != expected:
-            statements[0][1].refuse(f"{expected[0] if expected else 'a move'} before the first move")
-        return rows
+        return rows_of_moves(self._events, [*self._with_joints(moves, tasks)], between)
 
     def _with_joints(self, moves: Sequence[ReadMove | RapidMove], tasks: Sequence[str | None]) -> Iterator[ReadMove]:
         """All moves, those of joints with their joints and how they are rounded."""

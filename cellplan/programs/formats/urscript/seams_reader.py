@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable, Sequence
-from itertools import product
 from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
@@ -12,7 +11,7 @@ from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, RobotRows
 from cellplan.model.units import MM
 from cellplan.programs.elements.joints import Angle, from_numbers
-from cellplan.programs.elements.paced import ReadMove, Switches, rows_of_moves
+from cellplan.programs.elements.paced import ReadMove, rows_of_moves
 from cellplan.programs.elements.text import line_error
 from cellplan.programs.formats.urscript.rows import move_acceleration
 from cellplan.programs.formats.urscript.seams import (
@@ -25,7 +24,7 @@ from cellplan.programs.formats.urscript.seams import (
 )
 from cellplan.programs.formats.urscript.statements import Statements, UrscriptStatement, compact
 from cellplan.programs.formats.urscript.text import approach_call, require_turns
-from cellplan.programs.formats.zones import tool_shares
+from cellplan.programs.formats.zones import with_shares
 
 _NUMBER: Final = r"-?(?:0|[1-9][0-9]{0,2})\.[0-9]{1,12}"
 _SIX: Final = rf"\[({_NUMBER}(?:,{_NUMBER}){{5}})\]"
@@ -56,10 +55,9 @@ class SeamReader:
         self._joints: dict[str, Array] = {}
         self._poses: dict[str, Array] = {}
         self._declared: dict[str, UrscriptStatement] = {}
-        self._moves: list[tuple[UrscriptStatement, ReadMove]] = []
+        self._moves: list[ReadMove] = []
         self._radii: list[float] = []
         self._between: list[list[str]] = [[]]
-        self._first: UrscriptStatement | None = None  # what stands before the first move
 
     def rows(self) -> RobotRows:
         """All rows; the statements up to the end of the program are taken. An ``InputError`` has file and line."""
@@ -85,7 +83,9 @@ class SeamReader:
             raise self._error(routine.head, "routines that are called once")
         for name, statement in self._declared.items():
             raise self._error(statement, f"points that are used ({name})")
-        return self._finished()
+        if not self._moves:
+            raise self._error(self._all.peek(), "movej")
+        return rows_of_moves(self._events, with_shares(self._robot, self._moves, self._radii), self._between)
 
     def _declare(self, statement: UrscriptStatement) -> bool:
         """Take in a declared point; whether it is one."""
@@ -123,35 +123,28 @@ class SeamReader:
     def _play(self, statement: UrscriptStatement, task: str | None) -> None:
         """Follow one statement."""
         if joint := _MOVEJ.fullmatch(statement.text):
-            self._add(statement, self._joint_move(statement, joint, task), float(joint[4] or 0.0))
+            self._add(self._joint_move(statement, joint, task), float(joint[4] or 0.0))
         elif tool := _TOOL.fullmatch(statement.text):
-            self._add(statement, self._tool_move(statement, tool, task), 0.0)
+            self._add(self._tool_move(statement, tool, task), 0.0)
         else:
-            flags = product((False, True), repeat=3)
-            texts = {text for one in flags for text in self._events.texts(task, Switches(*one))}
-            if self._events.plain(statement.text) not in map(self._events.plain, texts | {*self._events.before(True)}):
+            if not self._events.knows(task, statement.text):
                 raise self._error(statement, "a statement that these programs have")
-            if not self._moves:
-                self._first = statement
             self._between[-1].append(statement.text)
 
-    def _add(self, statement: UrscriptStatement, move: ReadMove, radius: float) -> None:
+    def _add(self, move: ReadMove, radius: float) -> None:
         """A move."""
-        self._moves.append((statement, move))
+        self._moves.append(move)
         self._radii.append(radius)
         self._between.append([])
 
     def _joint_move(self, statement: UrscriptStatement, words: re.Match[str], task: str | None) -> ReadMove:
         """A motion of the joints to a point."""
-        last = self._moves[-1][1] if self._moves else None
-        if last is not None and task is not None and last.task == task and last.poses:
-            raise self._error(statement, "no motion of the joints behind a line in a routine")
-        if last is None and f"a={words[2]},v={words[3]}" != compact(approach_call()):
+        if not self._moves and f"a={words[2]},v={words[3]}" != compact(approach_call()):
             raise self._error(statement, f"movej(…, {approach_call()}) to the first row")
         largest = max(joint.velocity for joint in self._robot.model.joints)
         if not 0.0 < float(words[3]) <= largest:
             raise self._error(statement, f"a speed above 0 and up to {largest:.3f} rad/s")
-        if last is not None and words[2] != f"{move_acceleration(self._robot):.3f}":
+        if self._moves and words[2] != f"{move_acceleration(self._robot):.3f}":
             raise self._error(statement, f"a={move_acceleration(self._robot):.3f}")
         return ReadMove(refuse=self._refusal(statement), task=task, q=self._point(statement, words[1], self._joints))
 
@@ -183,27 +176,6 @@ class SeamReader:
             raise self._error(statement, "a point that is declared for such a motion and used once")
         del self._declared[name]
         return points[name]
-
-    def _finished(self) -> RobotRows:
-        """The rows, once everything was followed."""
-        if not self._moves:
-            raise self._error(self._all.peek(), "movej")
-        q = np.array([move.q for _, move in self._moves])
-        for place, (statement, _) in enumerate(self._moves):
-            is_at_seam = any(other.poses for _, other in self._moves[max(place - 1, 0) : place + 2])
-            if self._radii[place] > 0.0 and is_at_seam:
-                raise self._error(statement, "a stop beside a seam, without r")
-        shares = tool_shares(self._robot, q, np.array(self._radii)).tolist()
-        moves = [
-            ReadMove(refuse=move.refuse, task=move.task, q=move.q, share=share) if not move.poses else move
-            for (_, move), share in zip(self._moves, shares, strict=True)
-        ]
-        rows = rows_of_moves(self._events, moves, self._between[1:])
-        expected = [*map(self._events.plain, self._events.before(bool(rows.marks)))]
-        if [*map(self._events.plain, self._between[0])] != expected:
-            at = self._first or self._moves[0][0]
-            raise self._error(at, "the output of the robot lowered first where it waits, and nothing else")
-        return rows
 
     def _error(self, statement: UrscriptStatement, expected: str) -> Exception:
         """The error that something else is expected at a statement."""

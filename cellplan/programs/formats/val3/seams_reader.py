@@ -1,8 +1,7 @@
 """Strict reader of VAL3 with seams: what is written, and harmless variants of it, nothing else."""
 
-from collections.abc import Callable, Mapping
-from itertools import product
-from typing import Final, NoReturn
+from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.report.exported import ExportFrame, ProgramRows, RobotRows
 from cellplan.model.units import MM
 from cellplan.programs.elements.joints import from_numbers
-from cellplan.programs.elements.paced import ReadMove, Switches, rows_of_moves
+from cellplan.programs.elements.paced import ReadMove, rows_of_moves
 from cellplan.programs.elements.pages import read_programs
 from cellplan.programs.elements.text import Statement
 from cellplan.programs.formats.val3.code import Loop, Node
@@ -28,7 +27,7 @@ from cellplan.programs.formats.val3.seams import (
     tool_values,
     val3_events,
 )
-from cellplan.programs.formats.zones import tool_shares
+from cellplan.programs.formats.zones import with_shares
 
 DECIMALS: Final = 9  # with which frames are compared
 SAME: Final = 1e-6  # [m] or [-] of a frame
@@ -59,9 +58,9 @@ class _SeamPlayer:
         name = project.path.rpartition("/")[2]
         self._tasks = {routine: task for task, routine in routine_names(frame, robot, name).items()}
         self._used: dict[str, int] = {}
-        self._moves: list[tuple[Statement, ReadMove]] = []
+        self._moves: list[ReadMove] = []
         self._zones: list[float] = []  # of moves of joints in [m]
-        self._between: list[list[Statement]] = [[]]
+        self._between: list[list[str]] = [[]]
         self._stands = True
         self._require_data()
 
@@ -114,7 +113,7 @@ class _SeamPlayer:
                 raise data.error("motions to all of its values", f"{self._used.get(name, 0)} of {data.size}")
         if not self._stands or not self._moves:
             raise start.end.error("motions and waitEndMove()", "the end")
-        return self._finished()
+        return rows_of_moves(self._events, with_shares(self._robot, self._moves, self._zones), self._between)
 
     def _play(self, node: Node, task: str | None) -> None:
         """Follow one statement."""
@@ -124,16 +123,13 @@ class _SeamPlayer:
         if statement.kind == "STAND":
             self._stands = True
         elif statement.kind in {"MOVE", "LINE", "ARC"}:
-            self._moves.append((statement, self._move(statement, task)))
+            self._moves.append(self._move(statement, task))
             self._between.append([])
             self._stands = False
         else:
-            flags = product((False, True), repeat=3)
-            texts = {text for one in flags for text in self._events.texts(task, Switches(*one))}
-            known = map(self._events.plain, texts | {*self._events.before(True)})
-            if self._events.plain(statement.text) not in known or not self._stands:
+            if not self._stands or not self._events.knows(task, statement.text):
                 raise statement.error("signals of the process or of a handshake, after waitEndMove()")
-            self._between[-1].append(statement)
+            self._between[-1].append(statement.text)
 
     def _move(self, statement: Statement, task: str | None) -> ReadMove:
         """A motion to the next value of its data."""
@@ -152,15 +148,12 @@ class _SeamPlayer:
         expected = JOINTS if is_joint else points_name(routine_names_of(self._tasks, task))
         values = [self._value(statement, name, index, expected) for name, index in zip(names, indices, strict=False)]
         if is_joint:
-            last = self._moves[-1][1] if self._moves else None
-            if last is not None and task is not None and last.task == task and last.poses:
-                raise statement.error("no motion of the joints behind a line in a program")
             numbers = np.array([[float(values[0].get(f"j{axis}", "0")) for axis in range(1, 7)]])
-            return ReadMove(refuse=_refusal(statement), task=task, q=from_numbers(self._robot, numbers)[0])
+            return ReadMove(refuse=statement.refuse, task=task, q=from_numbers(self._robot, numbers)[0])
         if task is None or any(value["fatherId"] != part_of(self._frame, self._robot.name, task) for value in values):
             raise statement.error("points of a task in its frame of the part, in its program")
         return ReadMove(
-            refuse=_refusal(statement),
+            refuse=statement.refuse,
             task=task,
             q=np.full(len(self._robot.model.joints), np.nan),
             poses=tuple(_pose(value) for value in values),
@@ -178,26 +171,6 @@ class _SeamPlayer:
         self._used[name] = index + 1
         return data.values[index]
 
-    def _finished(self) -> RobotRows:
-        """The rows of all moves."""
-        q = np.array([move.q for _, move in self._moves])
-        for place, (statement, _) in enumerate(self._moves):
-            is_at_seam = any(other.poses for _, other in self._moves[max(place - 1, 0) : place + 2])
-            if self._zones[place] > 0.0 and is_at_seam:
-                raise statement.error("a stop beside a seam (blend off)")
-        shares = tool_shares(self._robot, q, np.array(self._zones)).tolist()
-        moves = [
-            move if move.poses else ReadMove(refuse=move.refuse, task=move.task, q=move.q, share=share)
-            for (_, move), share in zip(self._moves, shares, strict=True)
-        ]
-        texts = [[statement.text for statement in statements] for statements in self._between]
-        rows = rows_of_moves(self._events, moves, texts[1:])
-        before = [*map(self._events.plain, self._events.before(bool(rows.marks)))]
-        if [*map(self._events.plain, texts[0])] != before:
-            at = self._between[0][0] if self._between[0] else self._moves[0][0]
-            raise at.error("the output of the robot lowered first where it waits, and nothing else")
-        return rows
-
 
 def routine_names_of(tasks: Mapping[str, str], task: str | None) -> str:
     """Name of the program of a task; empty for none."""
@@ -212,12 +185,3 @@ def _pose(value: Mapping[str, str]) -> Array:
 def _statement(node: Node) -> Statement:
     """A statement, or that with which a loop begins."""
     return node.head if isinstance(node, Loop) else node
-
-
-def _refusal(statement: Statement) -> Callable[[str, str | None], NoReturn]:
-    """What refuses a statement."""
-
-    def refuse(expected: str, got: str | None) -> NoReturn:
-        raise statement.error(expected, got)
-
-    return refuse
