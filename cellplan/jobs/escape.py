@@ -12,7 +12,8 @@ from cellplan.errors import InputError, NotVerifiedError
 from cellplan.files.input.files import digest
 from cellplan.files.input.findings import listed
 from cellplan.geometry.transforms import Array
-from cellplan.jobs.recover.legs import WRITTEN_TOL, Leg, Track, bends, leg_findings, recovery_legs, recovery_rows
+from cellplan.jobs.recover.legs import WRITTEN_TOL, Leg, Track, leg_findings, recovery_legs, recovery_rows
+from cellplan.jobs.recover.programs import WITHIN
 from cellplan.jobs.recover.recover import Recovery, recover
 from cellplan.jobs.recover.state import RunPlaces
 from cellplan.model.progress import Progress, silent
@@ -35,6 +36,7 @@ from cellplan.programs.export.written import read_files, write
 from cellplan.programs.promises.orders import Orders
 from cellplan.programs.promises.promises import waits
 from cellplan.programs.rows.margins import corner_vectors
+from cellplan.programs.rows.thin import bends
 from cellplan.programs.shared import Shared
 
 OFF: Final = 0.1  # [deg] or [mm] that a robot may stand off its rows, beside what rounding puts it off
@@ -216,7 +218,7 @@ def _programs(
             rows, legs = recovery_rows(route.recovery.phases)[:, cell.columns(name)], list[tuple[int, int] | None]()
             for leg in route.legs:
                 q = rows[leg.first : leg.last + 1]
-                moved = q[bends(q)[1:]] if np.any(q != q[0]) else q[:0]
+                moved = q[bends(q, WITHIN)[1:]] if np.any(q != q[0]) else q[:0]
                 begin = sum(map(len, homeward))
                 legs.append((begin + 1, begin + len(moved)) if len(moved) else None)
                 homeward.append(moved)

@@ -13,12 +13,12 @@ from builders.stored_cells import solve_into
 from cellplan.cli.main import run as run_command
 from cellplan.errors import InputError
 from cellplan.files.run.joint_tables import parse_table
-from cellplan.jobs.recover.legs import WITHIN, bends
-from cellplan.jobs.recover.programs import RecoveryPrograms, recovery_programs
+from cellplan.jobs.recover.programs import WITHIN, RecoveryPrograms, recovery_programs
 from cellplan.jobs.recover.recover import Recovery, recover
 from cellplan.model.report.exported import Promise
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.dialects import DIALECTS
+from cellplan.programs.rows.thin import bends
 from cellplan.runs.gate.open_gate import open_gate
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -65,11 +65,11 @@ def test_programs_hold_the_tables_and_a_pose_that_is_off_is_refused(
 def test_rows_that_are_left_out_lie_on_the_chords_of_those_that_stay() -> None:
     t = np.linspace(0.0, 1.0, 101)[:, None]
     corner = np.where(t < 0.4, t * [1.0, 2.0], [0.4, 0.8] + (t - 0.4) * [-1.0, 0.5])
-    assert bends(corner) == [0, 40, 100]  # the law of time on a straight line costs no row
-    assert bends(corner[(0.5 * (1.0 - np.cos(np.pi * t[:, 0])) * 40).astype(int)]) == [0, 100]
+    assert bends(corner, WITHIN) == [0, 40, 100]  # the law of time on a straight line costs no row
+    assert bends(corner[(0.5 * (1.0 - np.cos(np.pi * t[:, 0])) * 40).astype(int)], WITHIN) == [0, 100]
     t = np.linspace(0.0, 1.0, 1001)[:, None]
     arc = np.stack([np.cos(t[:, 0]), np.sin(t[:, 0])], axis=1)
-    stays = bends(arc)
+    stays = bends(arc, WITHIN)
     chords = np.stack([np.interp(t[:, 0], t[stays, 0], column) for column in arc[stays].T], axis=1)
     sagitta = np.linalg.norm(arc - chords, axis=1).max()
     assert 70 < len(stays) < 150  # chords whose sagitta is the tolerance span 0.0126 rad: 80 of them

@@ -16,7 +16,6 @@ from cellplan.model.motion.motion import JointTable
 from cellplan.programs.promises.orders import PhaseSearch, order_finding
 from cellplan.programs.promises.run_programs import RunPhase, RunProgram
 
-WITHIN: Final = 2e-5  # [rad] or [m] that joints may be off where rows are left out
 WRITTEN_TOL: Final = 1e-4  # [rad] or [m] by which rounding to few decimals may move the first row
 SLOWLY: Final = 1e4  # [s] from row to row where controllers choose the times: no speed is judged
 
@@ -60,21 +59,6 @@ def recovery_legs(places: RunPlaces, state: StoppedState, phases: Sequence[Recov
         ]
         begin += last
     return tuple(made)
-
-
-def bends(q: Array) -> list[int]:
-    """Rows between which joints move straight, ends included, for positions in [rad] or [m], shape (N, n)."""
-    bend_rows, waiting = {0, len(q) - 1}, [(0, len(q) - 1)]
-    while waiting:
-        first, last = waiting.pop()
-        along, from_first = q[last] - q[first], q[first : last + 1] - q[first]
-        share = np.clip(from_first @ along / max(float(along @ along), WITHIN**2), 0.0, 1.0)
-        off = np.abs(from_first - share[:, None] * along).max(axis=1)
-        row = first + int(np.argmax(off))
-        if off.max() > WITHIN:
-            bend_rows.add(row)
-            waiting += [(first, row), (row, last)]
-    return sorted(bend_rows)
 
 
 def leg_findings(

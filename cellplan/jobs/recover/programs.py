@@ -10,7 +10,7 @@ import numpy as np
 from cellplan.cache import without_cache
 from cellplan.errors import InputError, NotVerifiedError, raise_findings
 from cellplan.geometry.transforms import Array
-from cellplan.jobs.recover.legs import Leg, Track, bends, leg_findings, recovery_legs, recovery_rows
+from cellplan.jobs.recover.legs import Leg, Track, leg_findings, recovery_legs, recovery_rows
 from cellplan.jobs.recover.recover import Recovery
 from cellplan.jobs.recover.state import RunPlaces
 from cellplan.model.cell.cell import Cell
@@ -27,7 +27,9 @@ from cellplan.programs.judgement.compare_rows import other_rows
 from cellplan.programs.promises.promises import controllers_of, waits
 from cellplan.programs.rows.interpolant import HermiteRows, resting, row_velocities
 from cellplan.programs.rows.resample import lead_time, resampled
+from cellplan.programs.rows.thin import bends
 
+WITHIN: Final = 2e-5  # [rad] or [m] that joints may be off where rows are left out
 SAME_TIME: Final = 1e-7  # [s] rows nearer than this are one
 PARTS: Final = 10  # parts of a step of a cubic that are taken as even
 ONE_CLOCK: Final = "times of the tables: all robots start together, on controllers with one clock"
@@ -170,7 +172,7 @@ def _program(
 
 def _bend_rows(q: Array, legs: Sequence[Leg]) -> list[int]:
     """Rows that stay: the ends of all legs, and those at which joints change their direction."""
-    return sorted({leg.first + row for leg in legs for row in bends(q[leg.first : leg.last + 1])})
+    return sorted({leg.first + row for leg in legs for row in bends(q[leg.first : leg.last + 1], WITHIN)})
 
 
 def _rows(cell: Cell, name: str, q: Array, selected: Array, marks: Sequence[int]) -> RobotRows:

@@ -155,7 +155,8 @@ class RobotControlEntry(Entry):
     decimals: Annotated[int, Field(ge=0, le=MOST_DECIMALS)] | None = Field(
         default=None,
         description="Decimals of a degree or millimetre (of a radian in URScript) in programs of its controller's own "
-        "language: fanuc_ls, krl, rapid, urscript and val3; those of the format when absent, and in all other formats.",
+        "language: fanuc_ls, inform, krl, rapid, urscript and val3; those of the format when absent, and in all other "
+        "formats.",
     )
     cycle_ms: CycleTime | None = Field(
         default=None,

@@ -22,7 +22,7 @@ from cellplan.programs.promises.run_programs import run_programs
 from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
-FIXED: Final = frozenset({"fanuc"})  # kinds whose programs of lines state fixed frames only
+FIXED: Final = frozenset({"fanuc", "kuka", "staubli", "ur", "yaskawa"})  # kinds whose programs state fixed frames only
 SAME_TOL: Final = 1e-6  # [m] and [rad] within which poses of a part are one
 
 

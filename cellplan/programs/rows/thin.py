@@ -5,8 +5,9 @@ kept, each stretch between two of them that leaves a tolerance is split at the r
 first; then the tools and further holders on the part, whose poses are worked out from the thinned rows.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -188,6 +189,27 @@ def _split_by_tools(
             if tools.relations:
                 count = [sum(bool(movers & set(others)) for others in names) for movers in tools.movers]
                 group.split_by_tools(tools, phase.rows, full, np.array(count))
+
+
+def bends(q: Array, within: Array | float, *, needed: Iterable[int] = ()) -> list[int]:
+    """Rows between which joints move on straight lines, whatever their times: both ends, those needed, and the bends.
+
+    Positions are in [rad] or [m], shape (N, n); each joint may be off its line by so much, shape (n,).
+    """
+    scaled = q / within
+    rows = {0, len(q) - 1, *needed}
+    stretches = list(pairwise(sorted(rows)))
+    while stretches:
+        first, last = stretches.pop()
+        along, offset = scaled[last] - scaled[first], scaled[first : last + 1] - scaled[first]
+        share = np.clip(offset @ along / max(float(along @ along), 1.0), 0.0, 1.0)
+        off = np.abs(offset - share[:, None] * along).max(axis=1)
+        off[[0, -1]] = 0.0
+        row = first + int(np.argmax(off))
+        if off.max() > 1.0:
+            rows.add(row)
+            stretches += [(first, row), (row, last)]
+    return sorted(rows)
 
 
 def chosen_rows(scene: Scene, rows: RobotRows, chosen: Indices) -> RobotRows:

@@ -16,7 +16,7 @@ from cellplan.model.task.task import Frame, Task
 from cellplan.programs.elements.corners import LARGEST_SHARE, switches
 from cellplan.programs.rows.part_targets import LEFT_OVER
 from cellplan.programs.rows.rows import EssentialRows, WorkRows, times_of
-from cellplan.programs.rows.thin import chosen_rows
+from cellplan.programs.rows.thin import bends, chosen_rows
 from cellplan.programs.seams.shapes import STANDS, Shape, arc, corner_cut, line
 from cellplan.runs.plan.program import STILL_TOL
 from cellplan.scene.kinematics.screw_chain import ScrewChain
@@ -176,20 +176,9 @@ class _SeamRows:
         """
         inside = sorted(row for row in self.chosen if first <= row <= last)
         joints = self.scene.cell.robot(self.rows.robot).model.joints
-        scaled = self.rows.q[inside] / np.array([THIN_TURN if joint.is_revolute else THIN_SLIDE for joint in joints])
+        within = np.array([THIN_TURN if joint.is_revolute else THIN_SLIDE for joint in joints])
         needed = [k for k, row in enumerate(inside) if row in self.rows.marks or switches(self.rows)[row]]
-        ends = {0, len(inside) - 1, *needed}
-        stretches = list(pairwise(sorted(ends)))
-        while stretches:
-            begin, end = stretches.pop()
-            chord, offset = scaled[end] - scaled[begin], scaled[begin + 1 : end] - scaled[begin]
-            share = np.clip(offset @ chord / max(float(chord @ chord), STANDS), 0.0, 1.0)
-            off = np.abs(offset - share[:, None] * chord).max(axis=1, initial=0.0)
-            if off.max(initial=0.0) > 1.0:
-                place = begin + 1 + int(np.argmax(off))
-                ends.add(place)
-                stretches += [(begin, place), (place, end)]
-        left = [inside[place] for place in sorted(ends)]
+        left = [inside[place] for place in bends(self.rows.q[inside], within, needed=needed)]
         before, after = (_shorter(self.rows.q, rows) for rows in (inside, left))
         for row in left[1:-1]:
             self.rounding[row] *= min(1.0, before[row] / max(after[row], STANDS))

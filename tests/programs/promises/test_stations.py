@@ -12,7 +12,7 @@ from cellplan.files.run.stored import read_stored_run
 from cellplan.geometry.transforms import Array, inverse, pose
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.verified_run import ReadRun
-from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
+from cellplan.model.settings.controllers import ControllerEntry, KindName, RobotControlEntry
 from cellplan.model.task.task import Frame
 from cellplan.programs.promises.stations import stations
 from cellplan.runs.gate.open_gate import read_run
@@ -110,10 +110,11 @@ def test_a_part_in_the_same_hands_goes_with_the_flange(in_turn: ReadRun) -> None
     np.testing.assert_allclose(stations(turned)["kuka"][0].X, pose(rpy=(0.0, 0.0, np.pi)) @ grasp, atol=1e-12)
 
 
-def test_groups_of_a_fanuc_controller_have_a_fixed_frame_for_each_pose_in_which_the_part_rests(
-    in_turn: ReadRun, moving: ReadRun
+@pytest.mark.parametrize("kind", ["fanuc", "kuka", "staubli", "ur", "yaskawa"])
+def test_robots_of_one_controller_have_a_fixed_frame_for_each_pose_in_which_the_part_rests(
+    in_turn: ReadRun, moving: ReadRun, kind: KindName
 ) -> None:
-    controllers = {"c": ControllerEntry(kind="fanuc")}
+    controllers = {"c": ControllerEntry(kind=kind)}
     same = control()
     together = connected(in_turn, reis=same, kuka=same, abb=same, staubli=same)
     apart, fixed = stations(in_turn), stations(replace(together, cell=replace(together.cell, controllers=controllers)))

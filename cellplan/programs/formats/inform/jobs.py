@@ -13,7 +13,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, Promise, Station
 from cellplan.model.units import MM
-from cellplan.programs.elements.frames import controller_base
+from cellplan.programs.elements.frames import controller_base, require_rest
 from cellplan.programs.elements.handshake import HandshakeStep, signals_by_key
 from cellplan.programs.elements.joints import Axes
 from cellplan.programs.elements.paced import Events
@@ -149,11 +149,7 @@ def _require_frames(frame: ExportFrame, robot: Robot) -> None:
     for number in numbers:
         _require_within(f"robots.{robot.name}.controller.frames", number, FRAMES, "each user frame")
     for station in stations:
-        if station.holder is not None:
-            raise InputError(
-                f"robots.{robot.name}.controller.id: expected a part that a robot of another controller holds, got "
-                f"'{station.holder}' on the same one (task '{station.tasks[0]}'): no user frame moves with it here"
-            )
+        require_rest(robot.name, station)
 
 
 def _require_within(key: str, number: int | None, bounds: tuple[int, int], what: str) -> None:

@@ -8,10 +8,10 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.model.report.exported import ExportFrame, Promise
+from cellplan.programs.elements.frames import require_rest
 from cellplan.programs.elements.joints import Axes
 from cellplan.programs.elements.pages import require_six_axes
 from cellplan.programs.formats.krl.poses import status_and_turn
-from cellplan.programs.formats.krl.seams import require_rest
 from cellplan.programs.formats.krl.text import EXTERNAL, require_numbers
 
 

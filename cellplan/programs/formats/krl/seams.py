@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from math import floor
 from typing import Final
 
-from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ExportFrame, Station
+from cellplan.model.report.exported import ExportFrame
 from cellplan.model.units import MM
 from cellplan.programs.elements.frames import on_flange
 from cellplan.programs.elements.handshake import HandshakeStep
@@ -72,13 +71,6 @@ def base_text(frame: ExportFrame, robot: str, task: str) -> str:
     """The frame in which a robot works on a task: by its number, or as it is declared."""
     station = frame.station(robot, task)
     return f"BASE_DATA[{station.number}]" if station.number else f"{PART}{frame.stations[robot].index(station) + 1}"
-
-
-def require_rest(robot: str, station: Station) -> None:
-    """Refuse a part that the controller itself moves, or that moves while a tool works."""
-    if station.X is None or station.holder is not None:
-        text = "that rests" if station.X is None else f"that is not moved by '{station.holder}' of the same controller"
-        raise InputError(f"robots.{robot}: expected a part {text} for LIN of krl (tasks {', '.join(station.tasks)})")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

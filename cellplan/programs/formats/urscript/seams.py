@@ -10,10 +10,9 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ExportFrame, RobotRows, Station
+from cellplan.model.report.exported import ExportFrame, RobotRows
 from cellplan.model.units import MM
 from cellplan.programs.elements.conventions import CONVENTIONS
 from cellplan.programs.elements.frames import on_flange
@@ -80,12 +79,6 @@ def frame_lines(frame: ExportFrame, robot: Robot) -> list[str]:
 def part_name(frame: ExportFrame, robot: str, task: str) -> str:
     """Name of the frame in which a robot works on a task."""
     return f"{PART}{frame.stations[robot].index(frame.station(robot, task)) + 1}"
-
-
-def require_rest(robot: str, station: Station) -> None:
-    """Refuse a part that moves while a tool works."""
-    if station.X is None or station.holder is not None:
-        raise InputError(f"robots.{robot}: expected a part that rests for movel (tasks {', '.join(station.tasks)})")
 
 
 def joint_radii(robot: Robot, moves: Sequence[Move], rows: RobotRows) -> Array:

@@ -17,6 +17,7 @@ from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, Promise, RobotRows
 from cellplan.programs.elements.corners import chosen_shares
 from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.frames import require_rest
 from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.joints import Angle, to_numbers
 from cellplan.programs.elements.paced import moves_of
@@ -25,7 +26,7 @@ from cellplan.programs.elements.text import comment, joined
 from cellplan.programs.elements.timed_rows import cycle_of, file_path, times_of
 from cellplan.programs.formats.urscript.reader import read_urscript
 from cellplan.programs.formats.urscript.rows import blend_radii, move_acceleration, move_speeds
-from cellplan.programs.formats.urscript.seams import SeamWriter, require_rest, routine_names, urscript_events
+from cellplan.programs.formats.urscript.seams import SeamWriter, routine_names, urscript_events
 from cellplan.programs.formats.urscript.text import (
     DECIMALS,
     ENDING,

@@ -15,10 +15,10 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ExportFrame, Station
+from cellplan.model.report.exported import ExportFrame
 from cellplan.model.units import MM
 from cellplan.programs.elements.conventions import CONVENTIONS
-from cellplan.programs.elements.frames import on_flange
+from cellplan.programs.elements.frames import on_flange, require_rest
 from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps
 from cellplan.programs.elements.joints import from_numbers
 from cellplan.programs.elements.paced import Events, Move, blocks
@@ -82,19 +82,13 @@ def signal_data(frame: ExportFrame, robot: str) -> dict[str, str]:
 def require_seams(frame: ExportFrame, robot: str) -> None:
     """Refuse a part that moves while a tool works, and routines that no project has."""
     for station in frame.stations.get(robot, ()):
-        _require_rest(robot, station)
+        require_rest(robot, station)
     form = val3_events(frame, robot).form
     if form is not None and form.routines:
         raise InputError(
             f"controllers.{frame.robot(robot).control.id}.process.on: expected outputs (doName=true) for val3, as a "  # type: ignore[union-attr]
             f"routine is no part of its project, got a call of {min(form.routines)}"
         )
-
-
-def _require_rest(robot: str, station: Station) -> None:
-    """Refuse a part that moves while a tool works."""
-    if station.X is None or station.holder is not None:
-        raise InputError(f"robots.{robot}: expected a part that rests for movel (tasks {', '.join(station.tasks)})")
 
 
 def routine_names(frame: ExportFrame, robot: str, project: str) -> dict[str, str]:
