@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from cellplan.jobs.compare.compare import CompareJob, compare
     from cellplan.jobs.fastest.result import write_fastest
     from cellplan.jobs.fastest.shortest import ShortestCycles, fastest
-    from cellplan.jobs.floor_plan_file import FloorPlanRequest, requested_floor_plan, write_floor_plan
+    from cellplan.jobs.floor_plan.floor_plan_file import FloorPlanRequest, requested_floor_plan, write_floor_plan
     from cellplan.jobs.layout.request import LayoutRequest
     from cellplan.jobs.layout.search import LayoutResult, search_layout
     from cellplan.jobs.present.frames import tables, to_frame
@@ -102,7 +102,7 @@ _HOME: Final = {
     "Moves": "model.report.exported",
     "CompareJob": "jobs.compare.compare",
     "Exported": "programs.export.several",
-    "FloorPlanRequest": "jobs.floor_plan_file",
+    "FloorPlanRequest": "jobs.floor_plan.floor_plan_file",
     "LayoutRequest": "jobs.layout.request",
     "LayoutResult": "jobs.layout.search",
     "MapRequest": "jobs.base_map.prepared",
@@ -135,7 +135,7 @@ _HOME: Final = {
     "recover": "jobs.recover.recover",
     "rehearse": "jobs.rehearsal.rehearse",
     "repair": "jobs.repair.repair",
-    "requested_floor_plan": "jobs.floor_plan_file",
+    "requested_floor_plan": "jobs.floor_plan.floor_plan_file",
     "screen": "jobs.screen",
     "search_layout": "jobs.layout.search",
     "solve": "runs.solve",
@@ -148,7 +148,7 @@ _HOME: Final = {
     "write_assignment": "jobs.assign.result",
     "write_base_map": "jobs.base_map.base_map",
     "write_fastest": "jobs.fastest.result",
-    "write_floor_plan": "jobs.floor_plan_file",
+    "write_floor_plan": "jobs.floor_plan.floor_plan_file",
     "write_repair": "jobs.repair.result",
     "write_recovery": "jobs.recover.result",
     "write_rehearsal": "jobs.rehearsal.result",

@@ -12,7 +12,7 @@ from cellplan.files.cell.load import load_cell
 from cellplan.jobs.base_map.base_map import map_study
 from cellplan.jobs.base_map.grid import BaseGrid
 from cellplan.jobs.base_map.prepared import MapRequest
-from cellplan.jobs.floor_plan_file import FloorPlanRequest, PlanFormat, requested_floor_plan
+from cellplan.jobs.floor_plan.floor_plan_file import FloorPlanRequest, PlanFormat, requested_floor_plan
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.search import search_layout
 from cellplan.jobs.view.write import ViewRequest, view

@@ -13,7 +13,7 @@ from recoveries import BruteForce
 
 from cellplan.cli.main import run as run_command
 from cellplan.errors import InputError, NotVerifiedError
-from cellplan.jobs.escape import WrittenEscape, escape_findings, escape_programs, homewards
+from cellplan.jobs.recover.escape import WrittenEscape, escape_findings, escape_programs, homewards
 from cellplan.jobs.recover.legs import recovery_rows
 from cellplan.jobs.recover.state import RunPlaces
 from cellplan.model.report.verified_run import VerifiedRun

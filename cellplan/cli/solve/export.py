@@ -134,7 +134,7 @@ def _escapes(
     run: "VerifiedRun", folder: Path, formats: "Mapping[str, bool]", choice: "Choice", progress: Listener
 ) -> Result:
     """Programs with escape programs, in each format that was named: all are written or none."""
-    from cellplan.jobs.escape import escape_lines, escape_programs, write_escape
+    from cellplan.jobs.recover.escape import escape_lines, escape_programs, write_escape
     from cellplan.programs.shared import Shared
 
     shared_results = Shared(run)

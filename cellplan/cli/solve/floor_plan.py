@@ -50,7 +50,7 @@ def floor_plan(options: FloorPlanOptions) -> None:
     and tool of each robot, and the part in every pose in which the robot works on it, as its maker writes them. Exit
     status: 0 the drawing was written, 1 frames of a run that failed, 2 bad input, 4 internal error.
     """
-    from cellplan.jobs.floor_plan_file import (
+    from cellplan.jobs.floor_plan.floor_plan_file import (
         FloorPlanRequest,
         PlanFormat,
         requested_floor_plan,

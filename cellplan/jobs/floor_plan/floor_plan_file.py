@@ -14,7 +14,7 @@ from cellplan.files.run.stored import read_stored_run
 from cellplan.files.run.whole_file import refuse_foreign, replace_older
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.check import check
-from cellplan.jobs.pendant_frames import pendant_frames
+from cellplan.jobs.floor_plan.pendant_frames import pendant_frames
 from cellplan.jobs.view.cell_scene import standing
 from cellplan.jobs.view.describe import path_points
 from cellplan.jobs.view.run_scene import stored_series
