@@ -20,9 +20,9 @@ TIME_ROUNDING: Final = 0.5e-3  # [s] formats write times with three decimals or 
 ROUNDING_TOL: Final = 1e-9  # [rad] or [m] arithmetic of units and zeros
 QUANTA: Final = 2.01  # [-] of the last decimal of a degree or millimetre: two axes that are coupled round by one each
 SHARE_TOL: Final = 0.02  # [-] zones are sizes, of segments between rows that are rounded; what is read is judged
-FEED_TOL: Final = 1e-6  # [m/s]
+FEED_TOL: Final = 1e-6  # [m/s] three decimals of a millimetre per second
 SEAM_PLACE: Final = 1e-5  # [mm] languages of radians state places in metres
-SEAM_TURN: Final = 1e-2  # [deg] rounding of three angles, of which pendants hold two or three decimals
+SEAM_TURN: Final = 2e-3  # [deg] three angles with three decimals, each off by half of the last one, turn by half of it
 SOLVED_TOL: Final = 1e-4  # [rad] or [m] positions that are worked out again from poses of tools
 
 
