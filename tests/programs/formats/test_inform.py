@@ -5,8 +5,9 @@ import re
 import numpy as np
 import pytest
 from builders.elbow_arm import tip
-from builders.seam_jobs import ROBOT, SEAM, X_WP, inform_job, run_of
+from builders.seam_jobs import ARC_AND_WEAVE, ROBOT, SEAM, X_WP, inform_job, run_of, seam_job
 
+from cellplan.errors import InputError, NotVerifiedError
 from cellplan.geometry.transforms import pose_from, rotation_exp
 from cellplan.model.report.exported import ExportJob
 from cellplan.programs.formats.inform.positions import configuration, joints_of
@@ -103,3 +104,77 @@ def test_joints_follow_from_a_pose_and_its_configuration(job: ExportJob) -> None
 
     assert len({tuple(row) for row in stated.tolist()}) == 8
     assert max(off) < 1e-6
+
+
+CHANGES = {
+    "feed": ("SEAM.JBI", "C00002 V=8.0", "C00002 V=9.0"),
+    "user frame": ("SEAM.JBI", "///USER 2", "///USER 3"),
+    "frame of the job": ("SEAM.JBI", "///FRAME USER 2", "///FRAME USER 3"),
+    "tool": ("SEAM.JBI", "///TOOL 1", "///TOOL 2"),
+    "wrist": ("SEAM.JBI", "///RCONF 1,", "///RCONF 0,"),
+    "elbow": ("SEAM.JBI", r"(///RCONF \d),0", r"\1,1"),
+    "half turn": ("SEAM.JBI", r"(///RCONF \d,\d,\d),0", r"\1,1"),
+    "point 0.2 mm off": ("SEAM.JBI", r"C00002=100\.000", "C00002=100.200"),
+    "on and off": ("SEAM.JBI", r"ARCON ASF#\(1\)", "ARCOF AEF#(1)"),
+    "weave that never ends": ("SEAM.JBI", "WVOF\r\n", ""),
+    "no weave": ("SEAM.JBI", r"WVON WEV#\(1\)\r\n", ""),
+    "another weave": ("SEAM.JBI", r"WEV#\(1\)", "WEV#(2)"),
+    "another condition": ("SEAM.JBI", r"ASF#\(1\)", "ASF#(2)"),
+    "rounded end": ("SEAM.JBI", r"(MOVC C00005 V=8\.0) PL=0", r"\1 PL=1"),
+    "stop within": ("SEAM.JBI", r"(MOVL C00002 V=8\.0) PL=1", r"\1 PL=0"),
+    "larger level": ("SEAM.JBI", r"(MOVL C00002 V=8\.0) PL=1", r"\1 PL=8"),
+    "number of positions": ("SEAM.JBI", "///NPOS 7", "///NPOS 6"),
+    "no end": ("SEAM.JBI", "END\r\n", ""),
+    "position used twice": ("SEAM.JBI", "MOVL C00002", "MOVL C00001"),
+    "line for an arc": ("SEAM.JBI", "MOVC C00004", "MOVL C00004"),
+    "joints for a line": ("SEAM.JBI", r"MOVL C00006 V=50\.0", "MOVJ C00006 VJ=50.00"),
+    "another job": ("ALPHA.JBI", "CALL JOB:SEAM", "CALL JOB:BEAM"),
+    "no call": ("ALPHA.JBI", "CALL JOB:SEAM\r\n", ""),
+    "a jump": ("ALPHA.JBI", "CALL JOB:SEAM\r\n", "JUMP *A\r\nCALL JOB:SEAM\r\n"),
+    "first motion rounded": ("ALPHA.JBI", r"(MOVJ C00000 VJ=10\.00) PL=0", r"\1 PL=1"),
+    "home": ("ALPHA.JBI", r"C00000=(-?\d+)\.(\d)", r"C00000=\1.9\2"),
+    "pulses": ("ALPHA.JBI", "///POSTYPE ROBOT", "///POSTYPE PULSE"),
+    "another group": ("SEAM.JBI", "///GROUP1 RB1", "///GROUP1 RB2"),
+    "a name": ("SEAM.JBI", "//NAME SEAM", "//NAME BEAM"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_change_of_a_file_is_noticed(change: str, job: ExportJob, files: dict[str, str]) -> None:
+    name, pattern, repl = CHANGES[change]
+    text, count = re.subn(pattern, repl, files[name], count=1)
+    assert count == 1
+    assert text != files[name]
+
+    try:
+        read = INFORM.read(job.frame, files | {name: text})
+        finding = next(other_rows(INFORM, job, read), "")
+        if not finding:
+            executed_programs(job, INFORM, [run_of(job)], read)
+    except (InputError, NotVerifiedError) as error:
+        finding = str(error)
+
+    assert finding
+
+
+@pytest.mark.parametrize(
+    ("stated", "message"),
+    [
+        (
+            {"tool_number": None},
+            "robots.alpha.controller.tool_number: expected the number of its tool on the controller",
+        ),
+        ({"tool_number": 64}, "robots.alpha.controller.tool_number: expected the number of its tool on the controller"),
+    ],
+)
+def test_numbers_that_are_missing_are_named(stated: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError) as error:
+        INFORM.render(inform_job(**stated))
+    assert "robots.alpha.controller.tool_number: expected the number of its tool on the controller" in str(error.value)
+    assert message in str(error.value)
+
+
+def test_a_corner_that_only_a_small_zone_could_round_is_refused() -> None:
+    job = seam_job("yaskawa", process=ARC_AND_WEAVE, control={"tool_number": 1, "frames": (2,)}, number=2)
+    with pytest.raises(NotVerifiedError, match="task 'seam': row 4: a corner in process"):
+        INFORM.render(job)
