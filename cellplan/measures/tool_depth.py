@@ -107,12 +107,7 @@ def _task_depth(
         deepest.append((body.name, *_deepest(columns, cell, X_ST)))
     name, row, depth = max(deepest, key=lambda entry: entry[2])
     return ToolDepth(
-        task=task.name,
-        robot=task.robot,
-        depth=depth,
-        at_s=float(fine_times[row]),
-        limit=task.tool_depth,
-        body=name,
+        task=task.name, robot=task.robot, depth=depth, at_s=float(fine_times[row]), limit=task.tool_depth, body=name
     )
 
 

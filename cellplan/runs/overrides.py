@@ -56,9 +56,7 @@ def with_draws(errors: "CellErrors", *, trials: int | None = None, seed: int | N
         if given is not None and given < least:
             raise InputError(f"{option}: expected a whole number of at least {least}, got {given}")
     return replace(
-        errors,
-        trials=errors.trials if trials is None else trials,
-        seed=errors.seed if seed is None else seed,
+        errors, trials=errors.trials if trials is None else trials, seed=errors.seed if seed is None else seed
     )
 
 

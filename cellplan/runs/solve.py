@@ -62,12 +62,7 @@ def solve(
 
 
 def solve_motion(
-    cell: Cell,
-    *,
-    task: str | None,
-    near: Path | None = None,
-    progress: Progress,
-    early: EarlyClearance | None = None,
+    cell: Cell, *, task: str | None, near: Path | None = None, progress: Progress, early: EarlyClearance | None = None
 ) -> tuple[Scene, Solution]:
     """All phases, verified but for their clearance, and the scene of the solved cell; see ``solve``.
 
@@ -130,11 +125,7 @@ def _solve_program(
 
 
 def certified(
-    solution: Solution,
-    *,
-    is_reported: bool = True,
-    progress: Progress,
-    early: EarlyClearance | None = None,
+    solution: Solution, *, is_reported: bool = True, progress: Progress, early: EarlyClearance | None = None
 ) -> Solution:
     """The solution with the clearance of every phase checked and the verdict in the headers of its tables.
 

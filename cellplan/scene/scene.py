@@ -27,11 +27,7 @@ from cellplan.scene.near import NearPairs, near_pairs, near_table_of
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, StraightMotion
 
 Entry = tuple[int, int, LeftOutKind, str]  # both bodies, kind and reason
-KIND: Final = {
-    Rule.CONTACT: LeftOutKind.CONTACT_ONLY,
-    Rule.PROCESS: LeftOutKind.AT_WORK,
-    Rule.GRIP: LeftOutKind.GRIP,
-}
+KIND: Final = {Rule.CONTACT: LeftOutKind.CONTACT_ONLY, Rule.PROCESS: LeftOutKind.AT_WORK, Rule.GRIP: LeftOutKind.GRIP}
 NO_BODY_REASON: Final = "none of its links has a body: contacts of its arm are not checked"
 FIXED_REASON: Final = "all of them are fixed: not checked against each other"
 
@@ -193,12 +189,7 @@ def _first_on_ground(scene: Scene, poses: BodyPoses, rows: Indices) -> int | Non
 
 
 def left_out(
-    cell: Cell,
-    bodies: Sequence[SceneBody],
-    pairs: Sequence[ScenePair],
-    excluded: Sequence[Excluded],
-    *,
-    engine: Engine,
+    cell: Cell, bodies: Sequence[SceneBody], pairs: Sequence[ScenePair], excluded: Sequence[Excluded], *, engine: Engine
 ) -> tuple[LeftOut, ...]:
     """What was left out, or has a weaker rule than clearance, in the order of the bodies.
 

@@ -62,11 +62,7 @@ class RegionBound:
 
 
 def certify_regions(
-    scene: Scene,
-    q: Array | Mapping[str, Array],
-    regions: Sequence[ClockRegion],
-    *,
-    with_minimum: bool = False,
+    scene: Scene, q: Array | Mapping[str, Array], regions: Sequence[ClockRegion], *, with_minimum: bool = False
 ) -> tuple[RegionBound, ...]:
     """Bound the distance of all pairs of bodies of two robots in regions of their programs, one result a region.
 

@@ -76,10 +76,7 @@ class ErrorsBetweenRows:
         self._jumped, self._share = _within_steps(schedule.times, schedule.jumps)
 
     def errors_between(
-        self,
-        accuracy: Sequence[TaskAccuracy],
-        closures: Sequence[ClosureAccuracy],
-        off: Sequence[Array] | None = None,
+        self, accuracy: Sequence[TaskAccuracy], closures: Sequence[ClosureAccuracy], off: Sequence[Array] | None = None
     ) -> tuple[list[BetweenRows], list[BetweenRows]]:
         """Largest errors between the rows of every task and of every closure.
 

@@ -26,8 +26,7 @@ class MapOptions(Options):
     y: Annotated[str | None, option("--y FROM:TO", "Range of y in mm (default: likewise).")] = None
     grid: Annotated[float, option("--grid MM", "Distance from one place to the next in mm.")] = 50.0
     yaw: Annotated[
-        str | None,
-        option("--yaw DEG", "yaw_deg of the base, or toward: x axis to the part (default: as it stands)."),
+        str | None, option("--yaw DEG", "yaw_deg of the base, or toward: x axis to the part (default: as it stands).")
     ] = None
     certify: Annotated[int, option("--certify N", "Solve and verify the N best places.", min=0, max=100)] = 0
     output: Annotated[
@@ -77,12 +76,7 @@ def base_map(options: MapOptions) -> Result | None:
         resumable(),
     ):
         record = map_study(
-            request,
-            folder,
-            workers=workers,
-            resume=options.resume,
-            certify=options.certify,
-            progress=progress,
+            request, folder, workers=workers, resume=options.resume, certify=options.certify, progress=progress
         )
     verified = [place["certified"]["status"] == "passed" for place in record["best"] if place["certified"] is not None]
     passes = any(verified) if options.certify else record["counts"]["passes"]

@@ -69,8 +69,7 @@ class LayoutOptions(Options):
         bool, option("--repair", "Find the smallest change with which the cell passes, and other remedies.")
     ] = False
     assign: Annotated[
-        bool,
-        option("--assign", "Assign open tasks (robot: any) and search the layout in turn, until neither gains."),
+        bool, option("--assign", "Assign open tasks (robot: any) and search the layout in turn, until neither gains.")
     ] = False
     resume: shared.ResumeSearch = False
     status: Annotated[bool, option("--status", "Say how far the search in the folder is, and do nothing.")] = False

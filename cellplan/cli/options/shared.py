@@ -43,17 +43,11 @@ Method = Annotated[
 ]
 Settings = Annotated[
     tuple[str, ...],
-    option(
-        "--set KEY=VALUE",
-        "Set any value of the cell file, such as robots.kuka.base.x_mm=900; may be repeated.",
-    ),
+    option("--set KEY=VALUE", "Set any value of the cell file, such as robots.kuka.base.x_mm=900; may be repeated."),
 ]
 PlotFormats = Annotated[
     tuple[str, ...],
-    option(
-        "--plots FORMAT",
-        "Write the plots as png or pdf too; SVG is always written. May be repeated.",
-    ),
+    option("--plots FORMAT", "Write the plots as png or pdf too; SVG is always written. May be repeated."),
 ]
 TaskName = Annotated[str | None, option("--task NAME", "Plan this task only.", autocompletion=task_names)]
 WithoutCell = Annotated[

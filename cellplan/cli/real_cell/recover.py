@@ -29,8 +29,7 @@ class RecoverOptions(Options):
     frozen: Annotated[
         tuple[str, ...],
         option(
-            "--frozen ROBOT@S",
-            "This robot stands where it is at another time, such as kuka@1.30; may be repeated.",
+            "--frozen ROBOT@S", "This robot stands where it is at another time, such as kuka@1.30; may be repeated."
         ),
     ] = ()
     keep: Annotated[tuple[str, ...], option("--keep ROBOT", "This robot is to stand still; may be repeated.")] = ()

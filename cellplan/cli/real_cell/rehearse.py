@@ -60,12 +60,7 @@ def rehearse(options: RehearseOptions) -> Result:
     refuse_unless_replaceable(folder)
     with progress_listener(quiet=options.quiet) as progress:
         rehearsal = rehearse_cell(
-            cell,
-            errors,
-            feedback=options.feedback,
-            in_pass=options.in_pass,
-            rounds=options.rounds,
-            progress=progress,
+            cell, errors, feedback=options.feedback, in_pass=options.in_pass, rounds=options.rounds, progress=progress
         )
         record = write_rehearsal(rehearsal, folder, formats=options.plots, progress=progress)
     status = ExitStatus.PASSED if rehearsal.passed else ExitStatus.CHECK_FAILED

@@ -21,19 +21,12 @@ class FloorPlanOptions(Options):
 
     path: Annotated[Path, argument("RUN|CELL", "Run folder or cell file.")]
     output: Annotated[
-        Path | None,
-        option("-o, --output FILE", "The drawing (default: outputs/<cell name>-floor-plan.FORMAT)."),
+        Path | None, option("-o, --output FILE", "The drawing (default: outputs/<cell name>-floor-plan.FORMAT).")
     ] = None
     form: Annotated[
         str | None, option("--format FORMAT", "svg or dxf (default: that of FILE by its ending, or svg).")
     ] = None
-    frames: Annotated[
-        bool,
-        option(
-            "--frames",
-            "Also the frames to type into the pendants, on A3.",
-        ),
-    ] = False
+    frames: Annotated[bool, option("--frames", "Also the frames to type into the pendants, on A3.")] = False
     cell: shared.OriginalCell = None
     controllers: shared.Controllers = None
     settings: shared.Settings = ()

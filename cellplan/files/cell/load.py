@@ -275,12 +275,7 @@ def _read_meshes(valid: ValidEntries, sources: Sources) -> None:
 
 
 def _cell(
-    whole: CellDocument,
-    models: Mapping[str, RobotModel],
-    targets: Targets,
-    *,
-    source: CellFile,
-    sources: Sources,
+    whole: CellDocument, models: Mapping[str, RobotModel], targets: Targets, *, source: CellFile, sources: Sources
 ) -> Cell:
     """The cell, once there are no findings."""
     document = source.document

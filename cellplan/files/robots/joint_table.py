@@ -174,10 +174,5 @@ def _joint(name: str, entry: JointEntry, parent: int) -> Joint:
     limits: dict[str, Any] = {name: si_or_none(getattr(entry, key)) for name, key in zip(RATES, keys, strict=True)}
     axis = np.array(entry.axis)
     return Joint(
-        name=name,
-        kind=kind,
-        parent=parent,
-        axis_B=axis / np.linalg.norm(axis),
-        point_B=in_si(entry.point_mm),
-        **limits,
+        name=name, kind=kind, parent=parent, axis_B=axis / np.linalg.norm(axis), point_B=in_si(entry.point_mm), **limits
     )

@@ -12,16 +12,7 @@ from cellplan.model.settings.acceleration import AccelerationChoice, CycleTime
 from cellplan.model.settings.assign import AssignEntry
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry
-from cellplan.model.settings.entry import (
-    Coordinates,
-    Entry,
-    Name,
-    PoseEntry,
-    Text,
-    by_kind,
-    require_unique,
-    rule,
-)
+from cellplan.model.settings.entry import Coordinates, Entry, Name, PoseEntry, Text, by_kind, require_unique, rule
 from cellplan.model.settings.layout import LayoutEntry
 from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.program import ProgramEntry
@@ -49,8 +40,7 @@ class GraspEntry(Entry):
         "first holder carries the part frame and has all six.",
     )
     depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = Field(
-        default=Mm(2.0),
-        description="Largest penetration of the part by the bodies that grip.",
+        default=Mm(2.0), description="Largest penetration of the part by the bodies that grip."
     )
     grip_bodies: tuple[Text, ...] | None = Field(
         default=None,

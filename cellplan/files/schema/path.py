@@ -5,15 +5,7 @@ from typing import Annotated, ClassVar, Final, Self
 from pydantic import Field, Tag, model_validator
 
 from cellplan.files.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
-from cellplan.model.settings.entry import (
-    Coordinate,
-    Direction,
-    Entry,
-    OneOf,
-    Text,
-    by_kind,
-    rule,
-)
+from cellplan.model.settings.entry import Coordinate, Direction, Entry, OneOf, Text, by_kind, rule
 from cellplan.model.settings.units import Mm, Within
 
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
@@ -83,8 +75,7 @@ class CsvEntry(Entry):
 
 
 CsvChoice = Annotated[
-    Annotated[Text, Tag(f"<{CSV_WORDS}>")] | Annotated[CsvEntry, Tag("<mapping>")],
-    by_kind(CSV_WORDS, mapping=dict),
+    Annotated[Text, Tag(f"<{CSV_WORDS}>")] | Annotated[CsvEntry, Tag("<mapping>")], by_kind(CSV_WORDS, mapping=dict)
 ]
 
 

@@ -26,17 +26,7 @@ from cellplan.model.settings.entry import (
 )
 from cellplan.model.settings.robot import FARTHEST, BodyAccuracyEntry, JointPosition, PayloadEntry
 from cellplan.model.settings.task import LONGEST_S
-from cellplan.model.settings.units import (
-    Deg,
-    DegPerS,
-    DegPerS2,
-    DegPerS3,
-    Mm,
-    MmPerS2,
-    MmPerS3,
-    Quantity,
-    Within,
-)
+from cellplan.model.settings.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS2, MmPerS3, Quantity, Within
 
 LARGEST_JOINT_DEG: Final = 3600.0  # ten turns: a wider range is a wrong unit
 FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a wrong unit

@@ -143,8 +143,7 @@ class TaskEntry(Entry):
         "first under held_by) carries it along the path; any other moves its tool through the cell.",
     )
     after: AfterChoice | None = Field(
-        default=None,
-        description="Tasks, of any robots, that must be done before this one begins; only with program.",
+        default=None, description="Tasks, of any robots, that must be done before this one begins; only with program."
     )
     start_deg: Configuration | None = Field(
         default=None,

@@ -333,11 +333,7 @@ def map_page(record: Record, plot: bytes) -> str:
 def map_files(record: Record, formats: Collection[str] = ()) -> dict[str, bytes]:
     """Content of the files of a map by name, its picture as SVG and in ``formats``."""
     plots = pictures({"map": map_figure(record)}, formats)
-    return {
-        "map.json": as_json(record).encode(),
-        **plots,
-        "map.html": map_page(record, plots["map.svg"]).encode(),
-    }
+    return {"map.json": as_json(record).encode(), **plots, "map.html": map_page(record, plots["map.svg"]).encode()}
 
 
 MAP: Final = ResultKind(

@@ -66,12 +66,7 @@ class CompareJob:
 
 
 def compare(
-    job: CompareJob,
-    folder: Path,
-    *,
-    workers: int | Executor = 1,
-    resume: bool = False,
-    progress: Progress = silent,
+    job: CompareJob, folder: Path, *, workers: int | Executor = 1, resume: bool = False, progress: Progress = silent
 ) -> Record:
     """Compare one cell in every mode, or several cells and runs, and write the study into a folder.
 

@@ -54,13 +54,7 @@ def refuse_unless_possible(per_hour: float, shortest: TimedProgram, step: float)
 
 
 def calmest(
-    base: Cell,
-    per_hour: float,
-    *,
-    written: TimedProgram,
-    laws: TimedProgram,
-    common: TimedProgram,
-    solved: SolvedAt,
+    base: Cell, per_hour: float, *, written: TimedProgram, laws: TimedProgram, common: TimedProgram, solved: SolvedAt
 ) -> MetDemand:
     """The program that makes ``per_hour`` parts at the smallest load, by the time laws or by the common speed."""
     step = base.motion.step

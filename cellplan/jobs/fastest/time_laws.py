@@ -68,10 +68,7 @@ def shortest_by_time_laws(base: Cell, written: TimedProgram, solved: SolvedAt) -
 
 
 def from_both_sides(
-    number: int,
-    first: TimedProgram,
-    at: Callable[[int], TimedProgram],
-    demanded_share: Callable[[TimedProgram], float],
+    number: int, first: TimedProgram, at: Callable[[int], TimedProgram], demanded_share: Callable[[TimedProgram], float]
 ) -> TimedProgram | None:
     """The program that keeps all limits in so many steps while it would not in a step less; None where none does.
 

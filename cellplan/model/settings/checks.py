@@ -37,8 +37,7 @@ class StopEntry(Entry):
         default=None, description="Largest depth of a tool in the part; it is only reported when absent."
     )
     clearance_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] | None = Field(
-        default=None,
-        description="Smallest distance of all that must not touch; it is only reported when absent.",
+        default=None, description="Smallest distance of all that must not touch; it is only reported when absent."
     )
 
     @model_validator(mode="after")
@@ -84,8 +83,7 @@ class ChecksEntry(Entry):
         "held; it is only reported when absent.",
     )
     tool_speed_mm_s: SlidingSpeed | None = Field(
-        default=None,
-        description="Largest allowed speed of any tool tip in the world; it is only reported when absent.",
+        default=None, description="Largest allowed speed of any tool tip in the world; it is only reported when absent."
     )
     stop: StopEntry | None = Field(
         default=None,

@@ -4,17 +4,7 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, Tag, WithJsonSchema, model_validator
 
-from cellplan.model.settings.entry import (
-    Coordinate,
-    Entry,
-    Name,
-    OneOf,
-    PoseEntry,
-    Size,
-    Text,
-    by_kind,
-    rule,
-)
+from cellplan.model.settings.entry import Coordinate, Entry, Name, OneOf, PoseEntry, Size, Text, by_kind, rule
 from cellplan.model.settings.units import Deg, Mm, Within
 
 ITEM_LIMIT: Final = 1000
@@ -30,8 +20,7 @@ BY_KEY: Final = {"type": "object", "additionalProperties": {"anyOf": [PAIR, {"ty
 Number = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 Range = tuple[Number, Number]
 RangeChoice = Annotated[
-    Annotated[int, Tag("<number>")] | Annotated[Range, Tag("<list>")],
-    by_kind(RANGE_WORDS, number=int, list=tuple),
+    Annotated[int, Tag("<number>")] | Annotated[Range, Tag("<list>")], by_kind(RANGE_WORDS, number=int, list=tuple)
 ]
 ItemChoice = Annotated[
     Annotated[Name, Tag(f"<{ITEM_WORDS}>")] | Annotated[Number, Tag("<number>")] | Annotated[Range, Tag("<list>")],

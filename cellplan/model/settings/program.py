@@ -26,8 +26,7 @@ class MarkEntry(Entry):
 
 
 MarkChoice = Annotated[
-    Annotated[Name, Tag(f"<{MARK_WORDS}>")] | Annotated[MarkEntry, Tag("<mapping>")],
-    by_kind(MARK_WORDS, mapping=dict),
+    Annotated[Name, Tag(f"<{MARK_WORDS}>")] | Annotated[MarkEntry, Tag("<mapping>")], by_kind(MARK_WORDS, mapping=dict)
 ]
 
 LEAST_PERCENT: Final = 1.0  # of the speed of joints: a slower move is a wrong unit
@@ -69,8 +68,7 @@ class PartPlaceEntry(Entry):
         "lets go, along its tool axis.",
     )
     lift_mm: StraightMove = Field(
-        default=Mm(50.0),
-        description="Height over which the part is moved straight up from its place, or down to it.",
+        default=Mm(50.0), description="Height over which the part is moved straight up from its place, or down to it."
     )
 
     @property
@@ -124,7 +122,7 @@ class OrderEntry(Entry):
 
     alternate: Annotated[tuple[Annotated[tuple[Name, ...], Field(min_length=1)], ...], Field(min_length=2)] = Field(
         description="Lists of tasks that take turns: the first of each list, then the second of each, and so on. A "
-        "task begins when the one before it is done.",
+        "task begins when the one before it is done."
     )
 
 

@@ -165,13 +165,7 @@ class StartTrials:
             return list(trials)
         candidates = Candidates.of([cell] * len(trials), np.array([trial.start for trial in trials]))
         runs = [
-            screen_layouts(
-                cell,
-                schedule,
-                candidates,
-                moving=run.moving,
-                accuracy=CLOSE_ENOUGH,
-            )
+            screen_layouts(cell, schedule, candidates, moving=run.moving, accuracy=CLOSE_ENOUGH)
             for run, schedule in zip(self._phases, schedules, strict=True)
         ]
         worst = reduce(Screening.worst, runs)

@@ -270,11 +270,7 @@ class _TreeSearch:
 
 
 def _joined(
-    trees: list[TimedTree],
-    ahead: int,
-    back: int,
-    ends: tuple[tuple[Array, int], tuple[Array, int]],
-    velocity: Array,
+    trees: list[TimedTree], ahead: int, back: int, ends: tuple[tuple[Array, int], tuple[Array, int]], velocity: Array
 ) -> SpaceTimePath:
     """The way along both trees to the nodes where they met."""
     there, home = trees[0].path_to(ahead)[::-1], trees[1].path_to(back)[1:]

@@ -6,14 +6,7 @@ from typing import Annotated, Any, Final, NamedTuple, TypedDict
 
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.report import CAUTION, Report
-from cellplan.report.record.common import (
-    Number,
-    Provenance,
-    Record,
-    RunCheckRecord,
-    number,
-    origin_record,
-)
+from cellplan.report.record.common import Number, Provenance, Record, RunCheckRecord, number, origin_record
 from cellplan.report.record.figures import Fold, figures_record
 from cellplan.report.record.phases import AT, in_phase, missing_moves, phase_key, phases_record
 from cellplan.report.record.run import HeadRecord, ReportedPhase, RunRecord, begin_record, run_record

@@ -81,11 +81,7 @@ def read_srdf(path: Path, settings: XacroSettings | None = None) -> Srdf:
     if included is not None and not pairs and not configurations:
         remarks.add("empty", f"{path.name}: has no pairs and no configurations: is it a file of macros for others?")
     return Srdf(
-        file=path.name,
-        pairs=pairs,
-        configurations=configurations,
-        included=included or (),
-        remarks=remarks.lines,
+        file=path.name, pairs=pairs, configurations=configurations, included=included or (), remarks=remarks.lines
     )
 
 

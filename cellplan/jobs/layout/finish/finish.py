@@ -194,13 +194,7 @@ class Finish:
                     self.ready, timed.standing, program
                 )
             result = CandidateResult(
-                trial=trial,
-                x=x,
-                start=start,
-                program=program,
-                reason=reason,
-                standing=timed.standing,
-                solves=solves,
+                trial=trial, x=x, start=start, program=program, reason=reason, standing=timed.standing, solves=solves
             )
             more = None if result.passed or program is None or solves >= ROUNDS else _enlarged(timed, program)
             if more is None:

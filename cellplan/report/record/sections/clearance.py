@@ -82,8 +82,7 @@ class LeftOutRecord(TypedDict):
     """A pair that was not judged in full."""
 
     kind: Annotated[
-        str,
-        "`excluded`, `srdf`, `grip`, `mounted`, `standing`, `at_work`, `contact_only`, `environment` or `no_body`",
+        str, "`excluded`, `srdf`, `grip`, `mounted`, `standing`, `at_work`, `contact_only`, `environment` or `no_body`"
     ]
     bodies: Annotated[list[str], "the bodies"]
     reason: Annotated[str, "the reason"]

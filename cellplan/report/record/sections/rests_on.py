@@ -140,13 +140,7 @@ class OpenSurfaceRecord(TypedDict):
 def open_surfaces_record(cell: Cell) -> list[OpenSurfaceRecord]:
     """Each body whose mesh is not closed, with the key that names it, and whether it has an inside nevertheless."""
     return [
-        {
-            "body": body,
-            "key": key,
-            "mesh": shape.source,
-            "open_edges": open_edges(shape),
-            "has_inside": shape.is_leaky,
-        }
+        {"body": body, "key": key, "mesh": shape.source, "open_edges": open_edges(shape), "has_inside": shape.is_leaky}
         for body, key, shape in _bodies(cell)
         if isinstance(shape, Mesh) and not shape.is_closed
     ]

@@ -107,10 +107,7 @@ def _closure_record(closure: ClosureAccuracy, report: Report, cell: Cell) -> Run
         "max_orientation_error_at_s": number(report.times[at_orientation]),
         "mean_position_error_mm": number(MM * mean_length(closure.position_error)),
         "mean_orientation_error_deg": number(DEG * mean_length(closure.orientation_error)),
-        "allowed": {
-            "position_mm": number(cell.checks.closure_mm),
-            "orientation_deg": number(cell.checks.closure_deg),
-        },
+        "allowed": {"position_mm": number(cell.checks.closure_mm), "orientation_deg": number(cell.checks.closure_deg)},
         "axes": [AXES[index] for index in closure.axes],
         **between_record(closure.between),
     }

@@ -13,17 +13,7 @@ from cellplan.files.robots.urdf.document.xml import Element, Remarks
 MOST_EXTRA: Final = 2  # characters by which a misspelt name is longer or shorter
 CHILDREN: Final = {
     "link": ("inertial", "visual", "collision"),
-    "joint": (
-        "origin",
-        "parent",
-        "child",
-        "axis",
-        "limit",
-        "mimic",
-        "dynamics",
-        "calibration",
-        "safety_controller",
-    ),
+    "joint": ("origin", "parent", "child", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller"),
     "visual": ("origin", "geometry", "material"),
     "collision": ("origin", "geometry", "material"),
 }
