@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Set
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.model.settings.acceleration import CycleTime
 from cellplan.model.settings.entry import Angle, Coordinate, Entry, Name, PoseEntry, Text, by_kind, rule
-from cellplan.model.settings.process_statements import ProcessStatementsEntry, require_process
+from cellplan.model.settings.process_statements import Distance, ProcessStatementsEntry, require_process
 from cellplan.model.settings.units import Ms, Within
 
 LARGEST_FACTOR: Final = 1_000.0  # [-] a larger coupling is a mistake
@@ -25,6 +26,7 @@ MOST_DECIMALS: Final = 9
 TASK_LIMIT: Final = 64
 SIGNAL_LIMIT: Final = 64
 FRAME_LIMIT: Final = 64
+LEVEL_LIMIT: Final = 8
 
 
 class ControllerZeroEntry(Entry):
@@ -83,7 +85,7 @@ KindName = Literal["abb", "fanuc", "kuka", "reis", "ros", "staubli", "ur", "yask
 class ControllerEntry(Entry):
     """A controller of the cell; robots on different controllers share no clock."""
 
-    NAMES: ClassVar[Set[str]] = frozenset({"tasks", "process"})  # keys that no proof depends on
+    NAMES: ClassVar[Set[str]] = frozenset({"tasks", "process", "position_levels_mm"})  # keys that no proof depends on
     kind: KindName = Field(description="Maker of the controller, or what drives the robot.")
     tasks: dict[Identifier, Identifier] = Field(
         default={},
@@ -107,12 +109,28 @@ class ControllerEntry(Entry):
     process: ProcessStatementsEntry | None = Field(
         default=None, description="How its programs begin and end a process; absent: not stated."
     )
+    position_levels_mm: tuple[Distance, ...] = Field(
+        default=(),
+        max_length=LEVEL_LIMIT,
+        description="Distances from a point within which motions with PL=1, PL=2 and so on are rounded, as set on the "
+        "controller, rising; only for kind yaskawa. Absent: not stated, and no small corner is rounded.",
+    )
 
     @model_validator(mode="after")
     def _has_process_of_its_kind(self) -> Self:
         """Process statements are those of the maker."""
         if self.process is not None:
             require_process(self.process, self.kind)
+        return self
+
+    @model_validator(mode="after")
+    def _has_rising_levels_of_yaskawa_only(self) -> Self:
+        """A larger position level rounds more; only Yaskawa has them."""
+        levels = self.position_levels_mm
+        if levels and self.kind != "yaskawa":
+            raise rule(f"unexpected key, it applies to kind yaskawa only, got {self.kind}", "position_levels_mm")
+        if any(second <= first for first, second in pairwise((0.0, *levels))):
+            raise rule(f"expected rising distances above 0, got {list(levels)}", "position_levels_mm")
         return self
 
     @model_validator(mode="after")

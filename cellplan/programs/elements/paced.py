@@ -61,6 +61,7 @@ class Events:
         signal: Text of an instruction of a handshake.
         wait: Text of a wait of some seconds.
         plain: A text without what does not count, as a reader compares it.
+        cure: What helps where no zone rounds a corner as little as it must be.
     """
 
     frame: ExportFrame
@@ -68,6 +69,7 @@ class Events:
     signal: Callable[[HandshakeStep], str]
     wait: Callable[[float], str]
     plain: Callable[[str], str] = str.strip
+    cure: str = "allow more (tolerance)"
 
     @property
     def form(self) -> ProcessForm | None:
@@ -135,8 +137,8 @@ def moves_of(job: ExportJob, program: ProgramRows, events: Events) -> tuple[Move
             raise NotVerifiedError(
                 [
                     f"task '{seam.task}': row {row + 1}: a corner in process that no zone within its tolerance rounds "
-                    "would be a stop, which ends the process: divide the task there, write joints (--moves joints), "
-                    "or, where zones have sizes, allow more (tolerance)"
+                    f"would be a stop, which ends the process: divide the task there, {events.cure}, or write joints "
+                    "(--moves joints)"
                 ]
             )
         moves.append(

@@ -28,6 +28,7 @@ THIN_TURN: Final = np.deg2rad(0.05)  # [rad] that a turning joint may be off the
 THIN_SLIDE: Final = 5e-5  # [m] that a sliding joint may, likewise
 SHARE_STEP: Final = 1e-5  # [-] to which the share of a corner is found
 MOST_TURN: Final = np.deg2rad(0.02)  # [rad] that a corner may be cut by
+CORNER_SPIN: Final = np.deg2rad(0.2)  # [rad] likewise, with the turn about the axis of a tool whose spin is free
 SLOWEST: Final = 1e-4  # [m/s] a tool that is slower turns rather than moves
 TURNS: Final = np.deg2rad(0.1)  # [rad] a tool that stands and turns by less moves on no line
 FEED_STEP: Final = 1e-4  # [m/s] to which speeds are rounded up where no feed is stated
@@ -283,13 +284,14 @@ def _cuts(path: ToolPath, pieces: Sequence[Piece]) -> Iterator[float]:
     square of that.
     """
     allowed = ROUNDING_SHARE * path.task.tolerance.between[0]
+    most_turn = CORNER_SPIN if path.task.is_spin_free else MOST_TURN
     for one, other in pairwise(pieces):
         shorter = min(one.shape.length, other.shape.length)
         low, high = 0.0, LARGEST_SHARE if shorter >= STANDS else 0.0
         share = high
         while high - low > SHARE_STEP:
-            cut, turn = corner_cut(one.shape, other.shape, share * shorter)
-            is_within = cut <= allowed and float(np.linalg.norm(turn)) <= MOST_TURN
+            corner = corner_cut(one.shape, other.shape, share * shorter)
+            is_within = corner.cut <= allowed and corner.swing <= MOST_TURN and corner.turn <= most_turn
             low, high = (share, high) if is_within else (low, share)
             if low == LARGEST_SHARE:
                 break

@@ -20,7 +20,7 @@ from cellplan.errors import InputError, NotVerifiedError
 from cellplan.geometry.transforms import Array, inverse, rotation_vector
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows, Seam
-from cellplan.model.units import MM
+from cellplan.model.units import DEG, MM
 from cellplan.programs.elements.corners import row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.frames import controller_base, on_flange
@@ -28,7 +28,7 @@ from cellplan.programs.elements.joints import Axes
 from cellplan.programs.elements.process import ProcessForm
 from cellplan.programs.rows.part_targets import POSE_TOL, solved_joints, tip_jacobians
 from cellplan.programs.rows.rows import times_of
-from cellplan.programs.seams.shapes import STANDS, Shape, arc, corner_cut, line
+from cellplan.programs.seams.shapes import LARGEST_ARC, STANDS, Shape, arc, corner_cut, line
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 LARGEST_STEP: Final = 0.05  # [rad] or [m] of a joint from row to row; more is a singular configuration that is passed
@@ -126,7 +126,9 @@ class SeamExecution:
             end = rows.X_PT[last]
             shape = arc(X, rows.X_PT[first + 1], end) if is_arc else line(X, end)
             if shape is None:
-                raise NotVerifiedError([f"task '{seam.task}': row {last}: no arc of at most 120 deg leads through it"])
+                raise NotVerifiedError(
+                    [f"task '{seam.task}': row {last}: no arc of at most {DEG * LARGEST_ARC:.0f} deg leads through it"]
+                )
             path = self._path(seam, (first, last), shape, X_WP, (q, travelled))
             paths.append((last, path))
             for row in range(first + 1, last + 1):
@@ -219,12 +221,11 @@ class SeamExecution:
             if share <= 0.0:
                 continue
             other = paths[place + 1][1]
-            axis = self._rows.X_PT[row, :3, 2]  # type: ignore[index]
             radius = share * min(path.shape.length, other.shape.length)
-            cut, turn = corner_cut(path.shape, other.shape, radius)
+            corner = corner_cut(path.shape, other.shape, radius)
             is_free = self._frame.cell.task(seam.task).is_spin_free
-            seen = turn - axis * float(turn @ axis) if is_free else turn
-            on_tool, on_joints = (np.array([cut, np.linalg.norm(turned)]) for turned in (seen, turn))
+            on_tool = np.array([corner.cut, corner.swing if is_free else corner.turn])
+            on_joints = np.array([corner.cut, corner.turn])
             for piece, near in (
                 (place, (1.0 - path.shares) * path.shape.length <= radius),
                 (place + 1, other.shares * other.shape.length <= radius),

@@ -7,7 +7,7 @@ is stated here as the *rule margin* is the largest difference of any of them fro
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,8 @@ from cellplan.geometry.transforms import (
     rpy_from_rotation,
 )
 
-LARGEST_ARC: Final = np.deg2rad(120.0)  # [rad] longer arcs are divided: their plane is known worse from three points
+# [rad] longer arcs are divided: their plane is known worse from three points; a third of a ring is one, with a row more
+LARGEST_ARC: Final = np.deg2rad(121.0)
 FLAT: Final = 1e-6  # [m] three points that are nearer to a line than this define no circle
 STANDS: Final = 1e-7  # [m] shorter moves have no direction
 RULE_RESERVE: Final = 1.1  # [-] the rules differ most in the middle, but for terms of third order
@@ -117,11 +118,19 @@ def arc(start: Array, middle: Array, end: Array) -> Shape | None:
     return Shape(start=start, turn=chord.turn, ahead=radius, normal=normal, angle=angle, rule_margin=margin)
 
 
-def corner_cut(one: Shape, other: Shape, radius: float) -> tuple[float, Array]:
-    """By how much a corner that is rounded within a distance in [m] of its row is cut, in [m], and by which turn.
+class CornerCut(NamedTuple):
+    """By how much a corner is cut."""
 
-    Whatever the curve, it stays in the triangle of the corner and the two places at which it leaves both paths. The
-    turn is a rotation vector in the frame of the part in [rad], shape (3,).
+    cut: float  # in [m]
+    turn: float  # in [rad]
+    swing: float  # in [rad], without the turn about the axis of the tool
+
+
+def corner_cut(one: Shape, other: Shape, radius: float) -> CornerCut:
+    """By how much a corner that is rounded within a distance in [m] of its row is cut.
+
+    Whatever the curve, it stays in the triangle of the corner and the two places at which it leaves both paths. Where
+    these meet smoothly, as arcs of one circle do, the cut is the square of the distance over the diameter.
     """
     ends = one.poses(np.array([max(1.0 - radius / one.length, 0.0), 1.0]))
     after = other.poses(np.array([min(radius / other.length, 1.0)]))[0]
@@ -129,7 +138,8 @@ def corner_cut(one: Shape, other: Shape, radius: float) -> tuple[float, Array]:
     length = float(chord @ chord)
     height = offset - chord * (float(offset @ chord) / length if length > 0.0 else 0.0)
     turns = [rotation_vector(end[:3, :3] @ ends[1][:3, :3].T) for end in (ends[0], after)]
-    return float(np.linalg.norm(height)), 0.5 * (turns[0] + turns[1])
+    turn, axis = 0.5 * (turns[0] + turns[1]), ends[1][:3, 2]
+    return CornerCut(*map(float, map(np.linalg.norm, (height, turn, turn - axis * (turn @ axis)))))
 
 
 def rule_difference(R: Array) -> float:

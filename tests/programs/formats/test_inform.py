@@ -1,15 +1,17 @@
 """INFORM: jobs with seams are read back as they were, and every change of a file is noticed."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from builders.elbow_arm import tip
-from builders.seam_jobs import ARC_AND_WEAVE, ROBOT, SEAM, X_WP, inform_job, run_of, seam_job
+from builders.seam_jobs import ARC_AND_WEAVE, CONTROLLER, PLACES, ROBOT, SEAM, X_WP, inform_job, run_of, seam_job
 
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.geometry.transforms import pose_from, rotation_exp
 from cellplan.model.report.exported import ExportJob
+from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.programs.formats.inform.positions import configuration, joints_of
 from cellplan.programs.formats.inform.writer import INFORM
 from cellplan.programs.judgement.compare_rows import other_rows
@@ -174,7 +176,63 @@ def test_numbers_that_are_missing_are_named(stated: dict[str, object], message: 
     assert message in str(error.value)
 
 
-def test_a_corner_that_only_a_small_zone_could_round_is_refused() -> None:
+def small_corner(levels: tuple[float, ...]) -> ExportJob:
+    """The job whose corner may be rounded within 10.77 mm of it, on a controller with some position levels in [mm]."""
     job = seam_job("yaskawa", process=ARC_AND_WEAVE, control={"tool_number": 1, "frames": (2,)}, number=2)
-    with pytest.raises(NotVerifiedError, match="task 'seam': row 4: a corner in process"):
-        INFORM.render(job)
+    entry = job.frame.cell.controllers[CONTROLLER]
+    stated = ControllerEntry.model_validate(entry.model_dump(exclude_unset=True) | {"position_levels_mm": levels})
+    cell = replace(job.frame.cell, controllers={CONTROLLER: stated})
+    return replace(job, frame=replace(job.frame, cell=cell))
+
+
+@pytest.mark.parametrize(
+    ("kind", "levels", "message"),
+    [
+        ("kuka", (1.0,), "unexpected key, it applies to kind yaskawa only, got kuka"),
+        ("yaskawa", (1.0, 1.0), "expected rising distances above 0, got"),
+        ("yaskawa", (0.0, 1.0), "expected rising distances above 0, got"),
+    ],
+)
+def test_levels_that_do_not_rise_are_refused(kind: str, levels: tuple[float, ...], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        ControllerEntry.model_validate({"kind": kind, "position_levels_mm": levels})
+
+
+@pytest.mark.parametrize(("levels", "cure"), [((), "state position_levels_mm"), ((20.0, 30.0), "allow more")])
+def test_a_corner_that_no_known_level_rounds_so_little_is_refused(levels: tuple[float, ...], cure: str) -> None:
+    with pytest.raises(NotVerifiedError, match=f"task 'seam': row 4: a corner in process.* {cure}"):
+        INFORM.render(small_corner(levels))
+
+
+@pytest.mark.parametrize(("levels", "level"), [((1.0, 2.0, 5.0), 3), ((2.5, 10.7, 10.8), 2), ((10.0,), 1)])
+def test_a_corner_takes_the_largest_level_that_rounds_no_more_than_it_may(
+    levels: tuple[float, ...], level: int
+) -> None:
+    """The smaller neighbour of the corner is the chord of 54 mm to the point of the arc; a fifth of it may be cut."""
+    job = small_corner(levels)
+    files = INFORM.render(job)
+
+    (program,) = INFORM.read(job.frame, files)
+
+    assert re.findall(r"MOVL C00002 V=8\.0 PL=(\d)", files["SEAM.JBI"]) == [str(level)]
+    assert list(other_rows(INFORM, job, (program,))) == []
+    rows = program.robots[ROBOT]
+    assert rows.rounding is not None
+    chord = np.linalg.norm(np.subtract(PLACES[3], PLACES[2]))
+    assert rows.rounding[3] * chord == pytest.approx(levels[level - 1] / 1000.0, rel=1e-4)
+    assert list(executed_programs(job, INFORM, [run_of(job)], (program,)))
+
+
+@pytest.mark.parametrize(("level", "message"), [("3", "rounding of at most"), ("4", "a position level of at most 3")])
+def test_a_larger_level_is_noticed(level: str, message: str) -> None:
+    job = small_corner((1.0, 5.0, 20.0))
+    files = INFORM.render(job)
+    changed, count = re.subn(r"(C0000[23] V=8\.0) PL=2", rf"\1 PL={level}", files["SEAM.JBI"])
+    assert count == 2
+
+    try:
+        finding = next(other_rows(INFORM, job, INFORM.read(job.frame, files | {"SEAM.JBI": changed})), "")
+    except InputError as error:
+        finding = str(error)
+
+    assert message in finding

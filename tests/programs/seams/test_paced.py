@@ -102,9 +102,9 @@ def test_points_lie_on_the_path_and_the_process_goes_on_and_off_at_its_ends(text
     assert ",fine," in ring[1]
     assert ",bead1," in ring[1]
     assert all(line.startswith(("DispC ", "DispL ")) and ",fine," not in line for line in ring[2:-2])
-    assert ring[-2].startswith("DispLEnd ")
+    assert ring[-2].startswith("DispCEnd ")
     assert ",fine," in ring[-2]
-    assert sum(line.startswith("DispC ") for line in ring) == 3
+    assert sum(line.startswith("DispC") for line in ring) == 3  # a third of the ring each, and nothing is left over
     assert len(ring) <= 12
     assert "speeddata s_40 := [40,500,100,20];" in text
     assert all(",s_40," in line for line in (*ring[2:-1], *corner[2:-1]))
@@ -285,3 +285,28 @@ def test_a_line_at_a_speed_that_a_joint_cannot_follow_is_refused(frame: ExportFr
     message = refusal(frame, replace(job, programs=(ProgramRows(name=None, robots={"arm": rows}),)), q)
 
     assert re.search(r"joint J\d of 'arm' would move at \d.* deg/s at 4e\+04 mm/s, allowed", message)
+
+
+@pytest.mark.slow
+def test_a_ring_and_a_corner_are_jobs_of_a_yaskawa_arm(tmp_path: Path) -> None:
+    """Its position levels round what may be rounded, and the jobs that are written are verified as they lie there."""
+    text = BEAD.read_text(encoding="utf-8")
+    statements = 'process: {on: "ARCON ASF#(1)", off: "ARCOF AEF#(1)"}\n    position_levels_mm: [0.25, 0.5, 1, 2]'
+    text = re.sub(r"process:\n +on:.*\n +inner:.*\n +off:.*\n +data:.*", statements, text, count=1)
+    text = text.replace("kind: abb", "kind: yaskawa").replace("{id: irc5,", "{id: irc5, tool_number: 1, frames: [1],")
+    (tmp_path / "cell.yaml").write_text(text.replace("position_mm: 0.5", "position_mm: 1.5"), encoding="utf-8")
+
+    for command in (
+        "solve cell.yaml -o run --quiet",
+        "export run --cell cell.yaml --format inform --moves linear -o jobs",
+        "verify jobs --run run --cell cell.yaml",
+    ):
+        assert run_command(f"cellplan {command}", tmp_path)[0] == 0
+
+    ring, corner = ((tmp_path / "jobs" / f"{name}.JBI").read_text(encoding="utf-8") for name in ("RING", "CORNER"))
+    assert re.findall(r"MOV(.) C\d+ V=40\.0 PL=(\d)", ring) == [
+        *[("C", "0"), ("C", "1"), ("C", "2")],  # each arc begins where the tool is
+        *[("L", "2"), ("C", "2"), ("C", "1"), ("C", "2")],
+        *[("L", "2"), ("C", "2"), ("C", "1"), ("C", "0")],
+    ]
+    assert re.findall(r"MOV(.) C\d+ V=40\.0 PL=(\d)", corner) == [("L", "2"), ("L", "0")]

@@ -65,15 +65,28 @@ def test_a_parabola_in_a_corner_stays_within_the_cut(turn: float) -> None:
     corner = pose(xyz=(0.1, 0.0, 0.0))
     end = pose_from(rotation_exp(0.02 * Z), corner[:3, 3] + 0.2 * ahead)
 
-    cut, turned = corner_cut(line(pose(), corner), line(corner, end), radius)
+    cut, turned, swung = corner_cut(line(pose(), corner), line(corner, end), radius)
 
     assert cut == pytest.approx(radius * np.sin(turn / 2.0), rel=1e-9)
-    np.testing.assert_allclose(turned, 0.5 * 0.02 * radius / 0.2 * Z, atol=1e-12)
+    assert turned == pytest.approx(0.5 * 0.02 * radius / 0.2, abs=1e-12)
+    assert swung == pytest.approx(0.0, abs=1e-12)  # the tool turns about its own axis only
     u = np.linspace(0.0, 1.0, 101)[:, None]
     parabola = (1 - u) ** 2 * (corner[:3, 3] - radius * np.eye(3)[0]) + 2 * u * (1 - u) * corner[:3, 3]
     parabola = parabola + u**2 * (corner[:3, 3] + radius * ahead)
     legs = np.minimum(np.abs(parabola[:, 1]), np.abs(np.cross(parabola - corner[:3, 3], ahead)[:, 2]))
     assert legs.max() <= cut
+
+
+@pytest.mark.parametrize("distance", [1e-3, 1e-2])
+def test_where_arcs_of_one_circle_meet_almost_nothing_is_cut(distance: float) -> None:
+    """The chord of two pieces of a circle is off it by the radius times one less the cosine of half of its angle."""
+    shapes = [arc(*(on_circle(angle) for angle in angles)) for angles in ((0.0, 1.0, 2.0), (2.0, 3.0, 4.0))]
+    one, other = (shape for shape in shapes if shape is not None)
+    radius = one.length / 2.0
+
+    corner = corner_cut(one, other, distance)
+
+    assert corner.cut == pytest.approx(radius * (1.0 - np.cos(distance / radius)), rel=1e-6)
 
 
 def test_a_line_turns_about_one_axis_of_the_part() -> None:

@@ -79,9 +79,17 @@ def job_names(frame: ExportFrame) -> tuple[dict[tuple[str | None, str], str], di
     return {key: names[label].upper() for key, label in mains.items()}, {task: names[task].upper() for task in tasks}
 
 
+def level_radii(frame: ExportFrame, robot: str) -> Array:
+    """Distances from a point in [m] within which lines and arcs with PL=1, 2 and so on are rounded; none if unknown."""
+    control = frame.robot(robot).control
+    return np.array([] if control is None else frame.cell.controllers[control.id].position_levels_mm, dtype=float) / MM
+
+
 def inform_events(frame: ExportFrame, robot: str) -> Events:
     """What stands between the moves of a robot."""
+    cure = "allow more (tolerance)" if len(level_radii(frame, robot)) else "state position_levels_mm of its controller"
     return Events(
+        cure=cure,
         frame=frame,
         robot=robot,
         signal=signal_text,

@@ -13,7 +13,7 @@ from cellplan.model.units import MM
 from cellplan.programs.elements.corners import LARGEST_SHARE
 from cellplan.programs.elements.paced import ReadMove, rows_of_moves
 from cellplan.programs.elements.text import Statement
-from cellplan.programs.formats.inform.jobs import JobFrame, inform_events, job_names, tasks_of
+from cellplan.programs.formats.inform.jobs import JobFrame, inform_events, job_names, level_radii, tasks_of
 from cellplan.programs.formats.inform.positions import joints_of
 from cellplan.programs.formats.inform.text import JobFile, JobPosition, read_job
 
@@ -25,7 +25,7 @@ class Motion(NamedTuple):
 
     statement: Statement
     positions: tuple[JobPosition, ...]  # its end; before it the point through which an arc leads
-    is_passed: bool  # whether its end is rounded
+    level: int  # position level of its end; 0 for a stop
 
 
 def read_inform(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
@@ -49,6 +49,7 @@ class _RobotReader:
         """Take the files that are left."""
         self._frame, self._robot, self._left = frame, robot, left
         self._tasks = dict(tasks_of(frame, robot.name))
+        self._radii = level_radii(frame, robot.name)
         self._moves: list[ReadMove] = []
         self._between: list[list[str]] = [[]]
 
@@ -96,8 +97,16 @@ class _RobotReader:
             poses=() if is_joint else tuple(position.X for position in motion.positions),
             configurations=None if is_joint else tuple(position.stated.tolist() for position in motion.positions),
             feed=np.nan if is_joint else float(str(statement.words[1])) / MM,
-            share=LARGEST_SHARE if motion.is_passed else 0.0,
+            zone=0.0 if is_joint else self._zone(motion),
+            share=LARGEST_SHARE if motion.level and (is_joint or not len(self._radii)) else 0.0,
         )
+
+    def _zone(self, motion: Motion) -> float:
+        """Distance in [m] from its end within which a line or an arc is rounded, where it is known."""
+        most = max(len(self._radii), 1)
+        if motion.level > most:
+            raise motion.statement.error(f"a position level of at most {most}, as position_levels_mm states them")
+        return float(self._radii[motion.level - 1]) if motion.level and len(self._radii) else 0.0
 
 
 def motions_of(job: JobFile) -> Iterator[Motion | Statement]:
@@ -120,7 +129,7 @@ def motions_of(job: JobFile) -> Iterator[Motion | Statement]:
             if here is None or is_behind_arc or len(rest) < ARC - 1 or not _repeats(motion, here):
                 raise statement.error("MOVC to where the tool is, through a point and to the end; MOVL between arcs")
             through, end = (_motion(inner, unused) for inner in rest[: ARC - 1])
-            if not through.is_passed or {inner.words[1] for inner in rest[: ARC - 1]} != {statement.words[1]}:
+            if not through.level or {inner.words[1] for inner in rest[: ARC - 1]} != {statement.words[1]}:
                 raise through.statement.error("a point of an arc that is passed, at the speed of its start")
             motion, place = end._replace(positions=(*through.positions, *end.positions)), place + ARC - 1
         here, is_behind_arc, place = motion, statement.kind == "MOVC", place + 1
@@ -134,9 +143,9 @@ def _motion(statement: Statement, unused: dict[int, JobPosition]) -> Motion:
     number = int(str(statement.words[0]))
     if number not in unused:
         raise statement.error("a position that is declared, and used once")
-    return Motion(statement, (unused.pop(number),), statement.words[-1] != "0")
+    return Motion(statement, (unused.pop(number),), int(str(statement.words[-1])))
 
 
 def _repeats(motion: Motion, here: Motion) -> bool:
     """Whether a motion leads to where the last one ended, rounded or not as that one."""
-    return motion.positions[-1].is_that_of(here.positions[-1]) and motion.is_passed is here.is_passed
+    return motion.positions[-1].is_that_of(here.positions[-1]) and motion.level == here.level

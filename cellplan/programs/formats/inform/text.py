@@ -20,8 +20,8 @@ POSITION: Final = re.compile(r"C(\d{5})=(-?\d+\.\d+(?:,-?\d+\.\d+){5})")
 CONFIGURATION: Final = re.compile(r"///RCONF ([01](?:,[01])+)")
 MOTIONS: Final = {
     "MOVJ": re.compile(r"MOVJ C(\d{5}) VJ=(\d{1,3}\.\d{1,2}) PL=([01])"),
-    "MOVL": re.compile(r"MOVL C(\d{5}) V=(\d{1,4}\.\d) PL=([01])"),
-    "MOVC": re.compile(r"MOVC C(\d{5}) V=(\d{1,4}\.\d) PL=([01])"),
+    "MOVL": re.compile(r"MOVL C(\d{5}) V=(\d{1,4}\.\d) PL=([0-8])"),
+    "MOVC": re.compile(r"MOVC C(\d{5}) V=(\d{1,4}\.\d) PL=([0-8])"),
     "CALL": re.compile(r"CALL JOB:([A-Z0-9_]+)"),
     "": re.compile(r"(?!MOV|SMOV|CALL JOB:[A-Z0-9_]+$).+"),  # what else stands there is compared with the cell
 }

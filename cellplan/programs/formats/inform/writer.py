@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.errors import InputError, NotVerifiedError, raise_findings, refusals
 from cellplan.geometry.transforms import Array, inverse
@@ -17,10 +18,18 @@ from cellplan.model.report.exported import ExportJob, Moves, ProgramRows, Promis
 from cellplan.programs.elements.conventions import convention_of
 from cellplan.programs.elements.corners import LARGEST_SHARE
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.paced import Events, Move, blocks, moves_of
+from cellplan.programs.elements.paced import NO_SHAPE, Events, Move, blocks, moves_of, shorter_lengths
 from cellplan.programs.elements.pages import PagedProgram, paged, robots_of
 from cellplan.programs.elements.text import ascii_text, comment, fixed, joined
-from cellplan.programs.formats.inform.jobs import KIND, JobFrame, demands, inform_events, job_names, speed_text
+from cellplan.programs.formats.inform.jobs import (
+    KIND,
+    JobFrame,
+    demands,
+    inform_events,
+    job_names,
+    level_radii,
+    speed_text,
+)
 from cellplan.programs.formats.inform.positions import REAR, STATED, WIDTH, configuration, joints_of, tool_pose
 from cellplan.programs.formats.inform.reader import read_inform
 from cellplan.programs.formats.inform.text import COMMENT, MOST
@@ -28,8 +37,7 @@ from cellplan.programs.formats.inform.text import COMMENT, MOST
 DECIMALS: Final = 3  # of a millimetre; degrees have one more
 SAME_JOINTS: Final = 1e-4  # [rad] within which a pose and a configuration must give the joints that are meant
 PASSED: Final = "PL=1"
-STOP: Final = "PL=0"
-SHARES: Final = (LARGEST_SHARE, 0.0)  # PL=1 and PL=0: how far a position level rounds is set at each controller
+SHARES: Final = (LARGEST_SHARE, 0.0)  # PL=1 and PL=0 of joints: how far a level rounds is set at each controller
 DATE: Final = "2000/01/01 00:00"  # the same rows give the same bytes
 LINE_END: Final = "\r\n"
 
@@ -93,13 +101,25 @@ class _RobotWriter:
     rows: RobotRows
     moves: tuple[Move, ...]
     events: Events
+    levels: NDArray[np.int_]  # position level of each row, shape (N,)
     configurations: np.ndarray  # of all rows, shape (N, 6)
 
     @classmethod
     def of(cls, job: ExportJob, program: ProgramRows, robot: str, name: str) -> "_RobotWriter":
-        """Those of a program; a row is rounded where half of both of its segments may be cut, and stops elsewhere."""
-        part = paged(job, INFORM, program, robot, name)
-        rows = replace(part.rows, rounding=np.where(part.shares >= LARGEST_SHARE, LARGEST_SHARE, 0.0))
+        """Those of a program.
+
+        Lines and arcs take the largest position level that rounds no more than is allowed. Where its distance is not
+        known, and for motions of joints, a row is rounded where half of both of its segments may be cut.
+        """
+        part, radii = paged(job, INFORM, program, robot, name), level_radii(job.frame, robot)
+        levels = (part.shares >= LARGEST_SHARE).astype(int)
+        rounding = LARGEST_SHARE * levels
+        if len(radii) and part.rows.X_PT is not None:
+            lengths, on_seam = shorter_lengths(part.rows.X_PT[:, :3, 3]), part.rows.on_seam
+            levels = np.where(on_seam, np.searchsorted(radii, part.shares * lengths, side="right"), levels)
+            zones = np.append([0.0], radii)[levels] / np.maximum(lengths, NO_SHAPE)
+            rounding = np.where(on_seam, zones, rounding)
+        rows = replace(part.rows, rounding=rounding)
         events = inform_events(job.frame, robot)
         return cls(
             job=job,
@@ -107,6 +127,7 @@ class _RobotWriter:
             rows=rows,
             moves=moves_of(job, replace(program, robots={**program.robots, robot: rows}), events),
             events=events,
+            levels=levels,
             configurations=configuration(part.placed, rows.q),
         )
 
@@ -161,18 +182,22 @@ class _RobotWriter:
                 ]
             )
         point = job.position(inverse(job.frame.X_WC) @ X_WT, stated.tolist())
-        return f"MOVJ {point} VJ={fixed(self.part.speeds[move.row], 2)} {_level(move)}"
+        return f"MOVJ {point} VJ={fixed(self.part.speeds[move.row], 2)} {self._level(move)}"
 
     def _tool_motions(self, job: _Job, seam: Seam, before: Move, move: Move) -> Iterator[str]:
         """A line, or the motions of an arc."""
         speed = f"V={speed_text(move.feed, seam.task)}"
         if move.middle is not None:
             if before.middle is not None:
-                yield f"MOVL {self._point(job, seam, before.row)} {speed} {_level(before)}"
-            yield f"MOVC {self._point(job, seam, before.row)} {speed} {_level(before)}"
+                yield f"MOVL {self._point(job, seam, before.row)} {speed} {self._level(before)}"
+            yield f"MOVC {self._point(job, seam, before.row)} {speed} {self._level(before)}"
             yield f"MOVC {self._point(job, seam, move.middle)} {speed} {PASSED}"
         kind = "MOVL" if move.middle is None else "MOVC"
-        yield f"{kind} {self._point(job, seam, move.row)} {speed} {_level(move)}"
+        yield f"{kind} {self._point(job, seam, move.row)} {speed} {self._level(move)}"
+
+    def _level(self, move: Move) -> str:
+        """The position level at the end of a motion."""
+        return f"PL={self.levels[move.row]}"
 
     def _point(self, job: _Job, seam: Seam, row: int) -> str:
         """The position of a row of a seam."""
@@ -182,11 +207,6 @@ class _RobotWriter:
         else:
             X = inverse(job.frame.X_WC) @ tool_pose(self.part.placed, q)
         return job.position(X, self.configurations[row].tolist())
-
-
-def _level(move: Move) -> str:
-    """The position level at the end of a motion."""
-    return PASSED if move.zone > 0.0 or move.share > 0.0 else STOP
 
 
 INFORM: Final = Dialect(
