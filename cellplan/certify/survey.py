@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.certify.bound import Bound, PairBound
+from cellplan.certify.bound import Bound
 from cellplan.certify.pair_search import Search
 from cellplan.certify.pair_state import SEARCH_TOL, PairState
 from cellplan.geometry.arrays import Array, Indices
@@ -113,12 +113,14 @@ class Survey:
     def bound(self) -> Bound:
         """All that was found and proved; the survey ends with it."""
         self.low.flags.writeable = False
-        spans, lowest = self.at_surface, self.low.min(axis=1, initial=np.inf).tolist()
-        pairs = (
-            PairBound.of(row, pair, self.states[row], low=self.low[row], lowest=lowest[row], span=spans.get(row))
-            for row, pair in enumerate(self.scene.pairs)
+        return Bound(
+            scene=self.scene,
+            q=self._q,
+            edges=self.edges,
+            low=self.low,
+            states=tuple(self.states),
+            at_surface=self.at_surface,
         )
-        return Bound(scene=self.scene, q=self._q, edges=self.edges, low=self.low, pairs=tuple(pairs))
 
     def _rank(self, row: int) -> None:
         """Rank a pair by its smallest distance; of pairs that only must not touch only the touch counts."""

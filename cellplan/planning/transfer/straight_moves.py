@@ -93,8 +93,8 @@ class StraightMoves:
             rows = [row for carriers, _ in moves for row in self._rows[carriers]]
             bound = certify(scene_of_rows(self._scene, rows), line, with_minimum=False)
             at_fault = {
-                self._carriers[rows[it.row]]
-                for it in bound.pairs
+                self._carriers[row]
+                for row, it in zip(rows, bound.states, strict=True)
                 if it.touches or it.unproved or it.distance < it.demand
             }
             is_known = bound.is_met or not at_fault
