@@ -22,27 +22,29 @@ def open_tasks(root: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     if not isinstance(tasks, Mapping) or not isinstance(robots, Mapping):
         return {}
     part = root.get("part")
-    held_by = part.get("held_by", ()) if isinstance(part, Mapping) else ()
-    holders = {entry.get("robot") for entry in held_by if isinstance(entry, Mapping)}
+    held_by = part.get("held_by") if isinstance(part, Mapping) else None
+    holders = (
+        [entry.get("robot") for entry in held_by if isinstance(entry, Mapping)] if isinstance(held_by, tuple) else []
+    )
     absent = {name for name, robot in robots.items() if isinstance(robot, Mapping) and robot.get("available") is False}
-    free = tuple(name for name in robots if name not in holders | absent)
+    free = tuple(name for name in robots if name not in holders and name not in absent)
     able: dict[str, tuple[str, ...]] = {}
     for name, task in tasks.items():
         robot = task.get("robot") if isinstance(task, Mapping) else None
         if (robot == ANY and ANY not in robots) or (isinstance(robot, str) and robot in absent):
             able[name] = free
         elif isinstance(robot, tuple):
-            able[name] = tuple(str(it) for it in robot if it not in absent)
+            able[name] = tuple(it for it in map(str, robot) if it not in absent)
     return able
 
 
 def with_first_robots(document: YamlDocument) -> YamlDocument:
     """The document with a robot for each open task, the first of its own, so that all else in it can be read."""
-    opened = open_tasks(document.root)
-    if not opened:
+    opened, robots = open_tasks(document.root), document.root.get("robots")
+    if not opened or not robots:
         return document
-    names = list(document.root["robots"])
-    first = {name: next((it for it in robots if it in names), names[-1]) for name, robots in opened.items()}
+    names = list(robots)
+    first = {name: next((it for it in able if it in names), names[-1]) for name, able in opened.items()}
     tasks = {
         name: {**task, "robot": first[name]} if name in first else task for name, task in document.root["tasks"].items()
     }

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+import yaml
 
 from cellplan.errors import InputError
 from cellplan.files.cell.load import load_cell, load_open_cell
@@ -68,3 +69,23 @@ def test_a_list_with_an_unknown_robot_is_refused(tmp_path: Path) -> None:
     assert len(str(refused.value).splitlines()) == 2  # all findings at once
     with pytest.raises(InputError, match=r"tasks\.top_1\.robot\[0\]: expected one of table, west, east, got 'north'"):
         load_open_cell(tmp_path / "cell.yaml")
+
+
+ODD = ("5", "~", "{}", "[[1]]", "[{robot: {}}]")
+
+
+@pytest.mark.parametrize("value", ODD)
+@pytest.mark.parametrize("place", ["robots", "part", "part.held_by", "tasks", "tasks.top_1", "tasks.top_1.robot"])
+def test_other_kinds_of_values_are_refused_with_their_lines(place: str, value: str, tmp_path: Path) -> None:
+    document = yaml.safe_load(OPEN.read_text())
+    *path, key = place.split(".")
+    section = document
+    for step in path:
+        section = section[step]
+    section[key] = yaml.safe_load(value)
+    file = tmp_path / "cell.yaml"
+    file.write_text(yaml.safe_dump(document, sort_keys=False))
+
+    with pytest.raises(InputError) as refused:
+        load_open_cell(file)
+    assert all(line.startswith(f"{file}:") for line in str(refused.value).splitlines())
