@@ -12,7 +12,17 @@ from cellplan.model.settings.acceleration import AccelerationChoice, CycleTime
 from cellplan.model.settings.assign import AssignEntry
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry
-from cellplan.model.settings.entry import Coordinates, Entry, Name, PoseEntry, Text, by_kind, require_unique, rule
+from cellplan.model.settings.entry import (
+    Coordinates,
+    Entry,
+    Name,
+    PoseEntry,
+    Text,
+    by_kind,
+    require_unique,
+    rule,
+    setting,
+)
 from cellplan.model.settings.layout import LayoutEntry
 from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.program import ProgramEntry
@@ -32,22 +42,22 @@ class GraspEntry(Entry):
     """A robot that holds the part."""
 
     robot: Name = Field(description="Robot that holds the part (a positioner).")
-    at: PoseEntry = Field(default=PoseEntry(), description="Pose of the holder's tool tip in the part frame.")
-    axes: tuple[TaskAxis, ...] = Field(
-        default=ALL_AXES,
+    at: PoseEntry = setting(PoseEntry(), "Pose of the holder's tool tip in the part frame.")
+    axes: tuple[TaskAxis, ...] = setting(
+        ALL_AXES,
+        "Components of its motion on the part that a further holder keeps at zero, in the part frame; the first "
+        "holder carries the part frame and has all six.",
         min_length=1,
-        description="Components of its motion on the part that a further holder keeps at zero, in the part frame; the "
-        "first holder carries the part frame and has all six.",
     )
-    depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = Field(
-        default=Mm(2.0), description="Largest penetration of the part by the bodies that grip."
+    depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = setting(
+        Mm(2.0), "Largest penetration of the part by the bodies that grip."
     )
-    grip_bodies: tuple[Text, ...] | None = Field(
-        default=None,
+    grip_bodies: tuple[Text, ...] | None = setting(
+        None,
+        "The bodies that grip: links, or bodies as reports name them, that are rigid with the flange. They may touch "
+        "the part, up to depth_mm; nothing else may. All that is rigid with the flange when absent.",
         min_length=1,
         max_length=GRIP_LIMIT,
-        description="The bodies that grip: links, or bodies as reports name them, that are rigid with the flange. They "
-        "may touch the part, up to depth_mm; nothing else may. All that is rigid with the flange when absent.",
     )
 
     @model_validator(mode="after")
@@ -61,22 +71,19 @@ class PartEntry(Entry):
     """The workpiece, held by robots or fixed in the world."""
 
     geometry: PartShapeEntry = Field(description="Shape of the part.")
-    held_by: tuple[GraspEntry, ...] = Field(
-        default=(),
+    held_by: tuple[GraspEntry, ...] = setting(
+        (),
+        "The robots that hold the part, the one that carries the part frame first; none: fixed in the world.",
         max_length=ROBOT_LIMIT,
-        description="The robots that hold the part, the one that carries the part frame first; none: fixed in the "
-        "world.",
     )
-    at: PoseEntry | None = Field(
-        default=None, description="Pose of the part frame in the world; required exactly when no robot holds the part."
+    at: PoseEntry | None = setting(
+        None, "Pose of the part frame in the world; required exactly when no robot holds the part."
     )
-    mass_kg: Mass | None = Field(
-        default=None, description="Mass, for the payload and for weights that grow with the load; absent: not stated."
+    mass_kg: Mass | None = setting(
+        None, "Mass, for the payload and for weights that grow with the load; absent: not stated."
     )
-    centre_mm: Coordinates | None = Field(
-        default=None,
-        description="Centre of mass in the part frame, for the payload; when absent that of the shape with uniform "
-        "density.",
+    centre_mm: Coordinates | None = setting(
+        None, "Centre of mass in the part frame, for the payload; when absent that of the shape with uniform density."
     )
 
     @model_validator(mode="after")
@@ -120,41 +127,39 @@ BuildUpChoice = Annotated[
 class MotionEntry(Entry):
     """Who moves, and the common clock."""
 
-    mode: Literal["simultaneous", "pairwise", "part_at_rest", "semi_coordinated"] = Field(
-        default="simultaneous",
-        description="Who moves: all robots; the positioner and one operator at a time; the operators only; the "
-        "positioner and the operators in turn (only with program).",
+    mode: Literal["simultaneous", "pairwise", "part_at_rest", "semi_coordinated"] = setting(
+        "simultaneous",
+        "Who moves: all robots; the positioner and one operator at a time; the operators only; the positioner and the "
+        "operators in turn (only with program).",
     )
-    duration_s: Seconds | None = Field(
-        default=None,
-        description="Length of the common clock; every task ends within it. When absent, every task has a time of its "
-        "own (duration_s, feed_mm_s or a file with times) and the clock ends with the last one.",
+    duration_s: Seconds | None = setting(
+        None,
+        "Length of the common clock; every task ends within it. When absent, every task has a time of its own "
+        "(duration_s, feed_mm_s or a file with times) and the clock ends with the last one.",
     )
-    step_s: Seconds = Field(default=0.001, description="Time between two rows; with grid_ms that of the solver only.")
-    grid_ms: CycleTime | None = Field(
-        default=None,
-        description="Grid of the controllers, 2, 4, 8 or 12 for example: all rows lie on it. A multiple of "
-        "step_s; when absent the rows are step_s apart.",
+    step_s: Seconds = setting(0.001, "Time between two rows; with grid_ms that of the solver only.")
+    grid_ms: CycleTime | None = setting(
+        None,
+        "Grid of the controllers, 2, 4, 8 or 12 for example: all rows lie on it. A multiple of step_s; when absent "
+        "the rows are step_s apart.",
     )
-    timing: TimingChoice = Field(
-        default="as_written",
-        description="When the joints are where: as the durations, feeds and time laws say; as fast as all joints can "
-        "go along the path that these give, all robots together, so that tools keep their paths on the part; or in a "
-        "given time, slower than that everywhere alike. Feeds are then upper limits.",
+    timing: TimingChoice = setting(
+        "as_written",
+        "When the joints are where: as the durations, feeds and time laws say; as fast as all joints can go along the "
+        "path that these give, all robots together, so that tools keep their paths on the part; or in a given time, "
+        "slower than that everywhere alike. Feeds are then upper limits.",
     )
-    jerk_build_up_s: BuildUpChoice = Field(
-        default=0.05,
-        description="Time in which a joint without a stated limit of jerk is taken to build up its full acceleration "
-        "in a retimed program; unlimited takes none.",
+    jerk_build_up_s: BuildUpChoice = setting(
+        0.05,
+        "Time in which a joint without a stated limit of jerk is taken to build up its full acceleration in a retimed "
+        "program; unlimited takes none.",
     )
-    controller_cycle_ms: CycleTime = Field(
-        default=Ms(4.0), description="Cycle of the controllers, over which jerk is taken."
-    )
-    time_law: TimeLawChoice = Field(default="quintic", description="Law of each stretch of path between stops.")
-    corners: CornerChoice = Field(default="stop", description="Stop at corners, or round them.")
-    cyclic: bool = Field(default=False, description="Whether all joints are to end where they started.")
-    locked_joints: tuple[LockedJointEntry, ...] = Field(
-        default=(), description="Joints that fail during the motion; the others compensate where they can."
+    controller_cycle_ms: CycleTime = setting(Ms(4.0), "Cycle of the controllers, over which jerk is taken.")
+    time_law: TimeLawChoice = setting("quintic", "Law of each stretch of path between stops.")
+    corners: CornerChoice = setting("stop", "Stop at corners, or round them.")
+    cyclic: bool = setting(False, "Whether all joints are to end where they started.")
+    locked_joints: tuple[LockedJointEntry, ...] = setting(
+        (), "Joints that fail during the motion; the others compensate where they can."
     )
 
     @model_validator(mode="after")
@@ -203,32 +208,30 @@ class CellDocument(Entry):
     robots: dict[Name, RobotEntry] = Field(
         min_length=1, max_length=ROBOT_LIMIT, description="Robots by name; their order is the order of the joints."
     )
-    controllers: dict[Name, ControllerEntry] | None = Field(
-        default=None,
+    controllers: dict[Name, ControllerEntry] | None = setting(
+        None,
+        "Controllers by name, each with at least one robot that names it under its key controller; absent: nothing is "
+        "known of them.",
         max_length=ROBOT_LIMIT,
-        description="Controllers by name, each with at least one robot that names it under its key controller; absent: "
-        "nothing is known of them.",
     )
     part: PartEntry = Field(description="The workpiece.")
     tasks: dict[Name, TaskEntry] = Field(min_length=1, max_length=TASK_LIMIT, description="Tasks by name.")
-    environment: dict[Name, ObstacleEntry] = Field(
-        default={}, max_length=OBSTACLE_LIMIT, description="Fixed obstacles in the cell by name."
+    environment: dict[Name, ObstacleEntry] = setting(
+        {}, "Fixed obstacles in the cell by name.", max_length=OBSTACLE_LIMIT
     )
     motion: MotionEntry = Field(description="Who moves, and the common clock.")
-    program: ProgramEntry | None = Field(
-        default=None,
-        description="A program from home to home, with any number of tasks for each robot; {} for all its defaults. "
-        "When absent the program begins and ends with the tasks, of which a robot has at most one.",
+    program: ProgramEntry | None = setting(
+        None,
+        "A program from home to home, with any number of tasks for each robot; {} for all its defaults. When absent "
+        "the program begins and ends with the tasks, of which a robot has at most one.",
     )
-    assign: AssignEntry | None = Field(
-        default=None, description="What `cellplan assign` may choose of a program; not used by solve."
-    )
-    acceleration: AccelerationChoice | None = Field(
-        default=None,
-        description="Accelerations that the joints of all robots are judged against, where a robot says nothing of its "
-        "own: {full_speed_in_s: [0.25, 0.25, 0.25, 0.15]} when absent. A stated limit of a joint counts before it; "
+    assign: AssignEntry | None = setting(None, "What `cellplan assign` may choose of a program; not used by solve.")
+    acceleration: AccelerationChoice | None = setting(
+        None,
+        "Accelerations that the joints of all robots are judged against, where a robot says nothing of its own: "
+        "{full_speed_in_s: [0.25, 0.25, 0.25, 0.15]} when absent. A stated limit of a joint counts before it; "
         "unlimited leaves also those unjudged that a robot file states.",
     )
-    solver: SolverEntry = Field(default=SolverEntry(), description="Resolution method, integrator and their settings.")
-    checks: ChecksEntry = Field(default=ChecksEntry(), description="Requirements of the checks.")
-    layout: LayoutEntry | None = Field(default=None, description="What a layout search may change; not used by solve.")
+    solver: SolverEntry = setting(SolverEntry(), "Resolution method, integrator and their settings.")
+    checks: ChecksEntry = setting(ChecksEntry(), "Requirements of the checks.")
+    layout: LayoutEntry | None = setting(None, "What a layout search may change; not used by solve.")

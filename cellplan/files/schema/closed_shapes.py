@@ -4,7 +4,17 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from cellplan.model.settings.entry import Angle, Component, Entry, PlaneCoordinates, SignedAxis, Size, by_kind, rule
+from cellplan.model.settings.entry import (
+    Angle,
+    Component,
+    Entry,
+    PlaneCoordinates,
+    SignedAxis,
+    Size,
+    by_kind,
+    rule,
+    setting,
+)
 from cellplan.model.settings.units import Deg, Mm
 
 PlaneWord = Literal["xy", "yz", "xz"]
@@ -23,12 +33,11 @@ class ClosedShapeEntry(Entry):
     """What all closed shapes share: a plane, a centre, and the way round."""
 
     plane: PlaneWord = Field(description="Plane of the part frame; its first letter is the first axis.")
-    center_mm: PlaneCoordinates = Field(default=(Mm(0.0), Mm(0.0)), description="Centre on the plane's two axes.")
-    direction: Literal["counterclockwise", "clockwise"] = Field(
-        default="counterclockwise",
-        description="Way round, seen from outside the surface: from the side that the path is projected from; for a "
-        "path that is used as drawn against the tool axis, or against the plane's normal axis when the tool axis lies "
-        "in the plane.",
+    center_mm: PlaneCoordinates = setting((Mm(0.0), Mm(0.0)), "Centre on the plane's two axes.")
+    direction: Literal["counterclockwise", "clockwise"] = setting(
+        "counterclockwise",
+        "Way round, seen from outside the surface: from the side that the path is projected from; for a path that is "
+        "used as drawn against the tool axis, or against the plane's normal axis when the tool axis lies in the plane.",
     )
 
 
@@ -36,9 +45,8 @@ class CircleEntry(ClosedShapeEntry):
     """A circle."""
 
     radius_mm: Size = Field(description="Radius.")
-    start_at: StartChoice = Field(
-        default=(1.0, 0.0),
-        description="Direction from the centre to the start: an axis of the plane, or [u, v] on the plane's axes.",
+    start_at: StartChoice = setting(
+        (1.0, 0.0), "Direction from the centre to the start: an axis of the plane, or [u, v] on the plane's axes."
     )
 
     @model_validator(mode="after")
@@ -52,11 +60,11 @@ class RectangleEntry(ClosedShapeEntry):
     """A rectangle."""
 
     sides_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
-    angle_deg: Angle = Field(default=Deg(0.0), description="Turn in the plane, from the first axis towards the second.")
-    start_at: PlaneDirection = Field(
-        default=(1.0, 1.0),
-        description="Corner of the start by the signs of its place before the rectangle is turned: [1, 1], [-1, 1], "
-        "[-1, -1] or [1, -1].",
+    angle_deg: Angle = setting(Deg(0.0), "Turn in the plane, from the first axis towards the second.")
+    start_at: PlaneDirection = setting(
+        (1.0, 1.0),
+        "Corner of the start by the signs of its place before the rectangle is turned: [1, 1], [-1, 1], [-1, -1] or "
+        "[1, -1].",
     )
 
     @model_validator(mode="after")
@@ -72,11 +80,11 @@ class RhombusEntry(ClosedShapeEntry):
     """A rhombus."""
 
     diagonals_mm: tuple[Size, Size] = Field(description="Length along the plane's first and second axis.")
-    angle_deg: Angle = Field(default=Deg(0.0), description="Turn in the plane, from the first axis towards the second.")
-    start_at: StartChoice = Field(
-        default=(1.0, 0.0),
-        description="Corner of the start before the rhombus is turned: an axis of the plane, or [u, v] along one of "
-        "the plane's axes.",
+    angle_deg: Angle = setting(Deg(0.0), "Turn in the plane, from the first axis towards the second.")
+    start_at: StartChoice = setting(
+        (1.0, 0.0),
+        "Corner of the start before the rhombus is turned: an axis of the plane, or [u, v] along one of the plane's "
+        "axes.",
     )
 
     @model_validator(mode="after")

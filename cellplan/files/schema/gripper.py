@@ -2,9 +2,9 @@
 
 from typing import Annotated, Final, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
-from cellplan.model.settings.entry import Entry, Text, require_unique, rule
+from cellplan.model.settings.entry import Entry, Text, require_unique, rule, setting
 from cellplan.model.settings.units import Deg, Mm, Within
 
 FINGER_LIMIT: Final = 2  # joints that open a gripper together
@@ -15,25 +15,24 @@ LARGEST_ANGLE_DEG: Final = 720.0
 class GripperEntry(Entry):
     """A gripper that a URDF brings along: its joints are held still, and its bodies may work on the part."""
 
-    joints: tuple[Text, ...] = Field(
-        default=(),
+    joints: tuple[Text, ...] = setting(
+        (),
+        "Joints that open it; mimic joints follow by themselves. When absent the only movable joint beyond the flange.",
         max_length=FINGER_LIMIT,
-        description="Joints that open it; mimic joints follow by themselves. When absent the only movable joint beyond "
-        "the flange.",
     )
-    opening_mm: Annotated[Mm, Within(ge=0.0, le=WIDEST_MM)] | None = Field(
-        default=None,
-        description="How far its sliding fingers have opened from their closed ends, all fingers together: for two "
-        "fingers that meet where they are closed, the distance between them.",
+    opening_mm: Annotated[Mm, Within(ge=0.0, le=WIDEST_MM)] | None = setting(
+        None,
+        "How far its sliding fingers have opened from their closed ends, all fingers together: for two fingers that "
+        "meet where they are closed, the distance between them.",
     )
-    angle_deg: Annotated[Deg, Within(ge=-LARGEST_ANGLE_DEG, le=LARGEST_ANGLE_DEG)] | None = Field(
-        default=None, description="Position of the joint of a gripper whose fingers turn; excludes opening_mm."
+    angle_deg: Annotated[Deg, Within(ge=-LARGEST_ANGLE_DEG, le=LARGEST_ANGLE_DEG)] | None = setting(
+        None, "Position of the joint of a gripper whose fingers turn; excludes opening_mm."
     )
-    bodies: tuple[Text, ...] | None = Field(
-        default=None,
+    bodies: tuple[Text, ...] | None = setting(
+        None,
+        "Links, or bodies as reports name them, that may touch the part near the tool tip while the robot works on "
+        "it, as those of a tool may; when absent all link bodies that are rigid with the flange.",
         min_length=1,
-        description="Links, or bodies as reports name them, that may touch the part near the tool tip while the robot "
-        "works on it, as those of a tool may; when absent all link bodies that are rigid with the flange.",
     )
 
     @model_validator(mode="after")

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cellplan.model.settings.entry import FARTHEST_MM, Angle, Entry, rule
+from cellplan.model.settings.entry import FARTHEST_MM, Angle, Entry, rule, setting
 
 COEFFICIENT_LIMIT: Final = 400  # more are a table of the motion, not a spline
 
@@ -15,23 +15,22 @@ Row = tuple[float, ...] | dict[str, Any]
 class JointPathEntry(Entry):
     """The joints of a positioner as a B-spline over the common clock, at rest at both ends."""
 
-    degree: Literal[3, 5] = Field(
-        default=5,
-        description="Degree of the polynomials between two knots; the knots are evenly spaced over the clock.",
+    degree: Literal[3, 5] = setting(
+        5, "Degree of the polynomials between two knots; the knots are evenly spaced over the clock."
     )
-    coefficients_deg: tuple[tuple[Angle, ...], ...] | None = Field(
-        default=None,
+    coefficients_deg: tuple[tuple[Angle, ...], ...] | None = setting(
+        None,
+        "Coefficients, one configuration each with one angle per joint, for robots with revolute joints only. The "
+        "first is the start posture, the last the end; both count three times, so that the joints begin and end at "
+        "rest and without acceleration. The path passes near the others.",
         min_length=2,
         max_length=COEFFICIENT_LIMIT,
-        description="Coefficients, one configuration each with one angle per joint, for robots with revolute joints "
-        "only. The first is the start posture, the last the end; both count three times, so that the joints begin and "
-        "end at rest and without acceleration. The path passes near the others.",
     )
-    coefficients: tuple[dict[str, JointValue], ...] | None = Field(
-        default=None,
+    coefficients: tuple[dict[str, JointValue], ...] | None = setting(
+        None,
+        "The same with one key per joint with its unit (a1_deg, rail_mm); excludes coefficients_deg.",
         min_length=2,
         max_length=COEFFICIENT_LIMIT,
-        description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes coefficients_deg.",
     )
 
     @model_validator(mode="after")

@@ -5,7 +5,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from cellplan.files.schema.shapes import SolidEntry
-from cellplan.model.settings.entry import Coordinate, Entry, Name, OneOf, PoseEntry, Size, Text
+from cellplan.model.settings.entry import Coordinate, Entry, Name, OneOf, PoseEntry, Size, Text, setting
 
 
 class PedestalColumnEntry(Entry):
@@ -25,17 +25,17 @@ class ColumnEntry(OneOf):
 
     alternatives: ClassVar[tuple[str, ...]] = ("cylinder", "box")
 
-    cylinder: PedestalColumnEntry | None = Field(default=None, description="Round column through the base's origin.")
-    box: PedestalBoxEntry | None = Field(default=None, description="Box round the base's origin, turned as it is.")
+    cylinder: PedestalColumnEntry | None = setting(None, "Round column through the base's origin.")
+    box: PedestalBoxEntry | None = setting(None, "Box round the base's origin, turned as it is.")
 
 
 class PedestalEntry(ColumnEntry):
     """What a robot stands on, upright from the floor to the origin of its base; a tilted base cuts off its top."""
 
-    floor_z_mm: Coordinate | None = Field(
-        default=None,
-        description="Height of the floor that it stands on; when absent the highest plane of the environment that is "
-        "not above the base.",
+    floor_z_mm: Coordinate | None = setting(
+        None,
+        "Height of the floor that it stands on; when absent the highest plane of the environment that is not above "
+        "the base.",
     )
 
 
@@ -54,25 +54,21 @@ class WallEntry(ColumnEntry):
 class RailBodyEntry(SolidEntry):
     """A solid of a rail: exactly one shape."""
 
-    at: PoseEntry = Field(
-        default=PoseEntry(), description="Pose of the solid in the base frame while the rail reads zero."
-    )
+    at: PoseEntry = setting(PoseEntry(), "Pose of the solid in the base frame while the rail reads zero.")
 
 
 class _OnLink(Entry):
     """The first keys of an attachment."""
 
     link: Text = Field(description="Link that carries it: the word base or a joint of a robot table, a link of a URDF.")
-    name: Name | None = Field(
-        default=None, description="Name in reports, as ROBOT/NAME; attachment, attachment_2, … when absent."
-    )
+    name: Name | None = setting(None, "Name in reports, as ROBOT/NAME; attachment, attachment_2, … when absent.")
 
 
 class AttachmentEntry(SolidEntry, _OnLink):
     """A solid mounted on a link of a robot, such as a hose, a feeder or a valve block: exactly one shape."""
 
-    at: PoseEntry = Field(
-        default=PoseEntry(),
-        description="Pose of the solid while all joints read zero: in the base frame for a robot table, as the bodies "
-        "of the table are given; in the frame of the link for a URDF.",
+    at: PoseEntry = setting(
+        PoseEntry(),
+        "Pose of the solid while all joints read zero: in the base frame for a robot table, as the bodies of the "
+        "table are given; in the frame of the link for a URDF.",
     )

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Final, Self
 from pydantic import Field, Tag, model_validator
 
 from cellplan.files.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
-from cellplan.model.settings.entry import Coordinate, Direction, Entry, OneOf, Text, by_kind, rule
+from cellplan.model.settings.entry import Coordinate, Direction, Entry, OneOf, Text, by_kind, rule, setting
 from cellplan.model.settings.units import Mm, Within
 
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
@@ -19,10 +19,8 @@ class PolylineEntry(Entry):
     points_mm: tuple[tuple[Coordinate, ...], ...] = Field(
         min_length=2, description="Points, all [u, v] on the plane's axes or all [x, y, z] in the part frame."
     )
-    plane: PlaneWord | None = Field(
-        default=None, description="Plane of the part frame; required with [u, v], not with [x, y, z]."
-    )
-    closed: bool = Field(default=False, description="Whether the last point is joined to the first.")
+    plane: PlaneWord | None = setting(None, "Plane of the part frame; required with [u, v], not with [x, y, z].")
+    closed: bool = setting(False, "Whether the last point is joined to the first.")
 
     @model_validator(mode="after")
     def _is_drawable(self) -> Self:
@@ -60,17 +58,14 @@ class CsvEntry(Entry):
         description="File with the header x_mm,y_mm,z_mm and optionally i,j,k or qw,qx,qy,qz, and t_s for a trajectory "
         "that brings its own clock."
     )
-    smooth: bool = Field(
-        default=True, description="Whether the points are joined by a smooth curve instead of straight sides."
+    smooth: bool = setting(True, "Whether the points are joined by a smooth curve instead of straight sides.")
+    closed: bool = setting(
+        False, "Whether the last point is joined to the first; a closed trajectory ends with its first row again."
     )
-    closed: bool = Field(
-        default=False,
-        description="Whether the last point is joined to the first; a closed trajectory ends with its first row again.",
-    )
-    join_mm: Annotated[Mm, Within(ge=0.0, le=MOST_JOINED_MM)] = Field(
-        default=Mm(0.0),
-        description="Points nearer to the point before than this are left out, and at the end of a closed path those "
-        "nearer to the first; not for a trajectory.",
+    join_mm: Annotated[Mm, Within(ge=0.0, le=MOST_JOINED_MM)] = setting(
+        Mm(0.0),
+        "Points nearer to the point before than this are left out, and at the end of a closed path those nearer to "
+        "the first; not for a trajectory.",
     )
 
 
@@ -84,19 +79,18 @@ class PathEntry(OneOf):
 
     alternatives: ClassVar[tuple[str, ...]] = ("circle", "rectangle", "rhombus", "polyline", "csv")
 
-    circle: CircleEntry | None = Field(default=None, description="Circle.")
-    rectangle: RectangleEntry | None = Field(default=None, description="Rectangle.")
-    rhombus: RhombusEntry | None = Field(default=None, description="Rhombus.")
-    polyline: PolylineEntry | None = Field(default=None, description="Points joined by straight sides.")
-    csv: CsvChoice | None = Field(default=None, description="Tool targets from a file.")
-    project: Direction | None = Field(
-        default=None,
-        description="Side of the part, as a direction in the part frame, from which the path is projected onto the "
-        "part; absent: not projected.",
+    circle: CircleEntry | None = setting(None, "Circle.")
+    rectangle: RectangleEntry | None = setting(None, "Rectangle.")
+    rhombus: RhombusEntry | None = setting(None, "Rhombus.")
+    polyline: PolylineEntry | None = setting(None, "Points joined by straight sides.")
+    csv: CsvChoice | None = setting(None, "Tool targets from a file.")
+    project: Direction | None = setting(
+        None,
+        "Side of the part, as a direction in the part frame, from which the path is projected onto the part; absent: "
+        "not projected.",
     )
-    offset_mm: Coordinate | None = Field(
-        default=None,
-        description="Shift of a planar path that is not projected along the plane's normal axis; 0 when absent.",
+    offset_mm: Coordinate | None = setting(
+        None, "Shift of a planar path that is not projected along the plane's normal axis; 0 when absent."
     )
 
     @model_validator(mode="after")

@@ -23,6 +23,7 @@ from cellplan.model.settings.entry import (
     by_kind,
     require_unique,
     rule,
+    setting,
 )
 from cellplan.model.settings.robot import FARTHEST, BodyAccuracyEntry, JointPosition, PayloadEntry
 from cellplan.model.settings.task import LONGEST_S
@@ -120,21 +121,17 @@ class ServiceEntry(Entry):
 class LimitsEntry(Entry):
     """Limits of one joint: they tighten those of the model, or supply what it lacks."""
 
-    lower_deg: JointAngle | None = Field(default=None, description="Lowest angle of a revolute joint.")
-    upper_deg: JointAngle | None = Field(default=None, description="Highest angle of a revolute joint.")
-    velocity_deg_s: TurningSpeed | None = Field(default=None, description="Largest speed of a revolute joint.")
-    acceleration_deg_s2: TurningAcceleration | None = Field(
-        default=None, description="Largest acceleration of a revolute joint."
-    )
-    jerk_deg_s3: TurningJerk | None = Field(default=None, description="Largest jerk of a revolute joint.")
-    lower_mm: Coordinate | None = Field(default=None, description="Lowest position of a prismatic joint.")
-    upper_mm: Coordinate | None = Field(default=None, description="Highest position of a prismatic joint.")
-    velocity_mm_s: SlidingSpeed | None = Field(default=None, description="Largest speed of a prismatic joint.")
-    acceleration_mm_s2: SlidingAcceleration | None = Field(
-        default=None, description="Largest acceleration of a prismatic joint."
-    )
-    jerk_mm_s3: SlidingJerk | None = Field(default=None, description="Largest jerk of a prismatic joint.")
-    wrap: bool = Field(default=False, description="Whether a continuous joint may turn without end.")
+    lower_deg: JointAngle | None = setting(None, "Lowest angle of a revolute joint.")
+    upper_deg: JointAngle | None = setting(None, "Highest angle of a revolute joint.")
+    velocity_deg_s: TurningSpeed | None = setting(None, "Largest speed of a revolute joint.")
+    acceleration_deg_s2: TurningAcceleration | None = setting(None, "Largest acceleration of a revolute joint.")
+    jerk_deg_s3: TurningJerk | None = setting(None, "Largest jerk of a revolute joint.")
+    lower_mm: Coordinate | None = setting(None, "Lowest position of a prismatic joint.")
+    upper_mm: Coordinate | None = setting(None, "Highest position of a prismatic joint.")
+    velocity_mm_s: SlidingSpeed | None = setting(None, "Largest speed of a prismatic joint.")
+    acceleration_mm_s2: SlidingAcceleration | None = setting(None, "Largest acceleration of a prismatic joint.")
+    jerk_mm_s3: SlidingJerk | None = setting(None, "Largest jerk of a prismatic joint.")
+    wrap: bool = setting(False, "Whether a continuous joint may turn without end.")
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -161,18 +158,18 @@ class LimitsEntry(Entry):
 class RailEntry(Entry):
     """A rail that carries the robot: a prismatic joint before its first one."""
 
-    name: Name = Field(default="rail", description="Name of the joint, in tables, start postures and reports.")
+    name: Name = setting("rail", "Name of the joint, in tables, start postures and reports.")
     axis: Direction = Field(description="Direction of the rail in the base frame: one of +x, -x, … or a vector.")
     lower_mm: Coordinate = Field(description="Lowest position.")
     upper_mm: Coordinate = Field(description="Highest position.")
     velocity_mm_s: SlidingSpeed = Field(description="Largest speed.")
-    acceleration_mm_s2: SlidingAcceleration | None = Field(default=None, description="Largest acceleration, if known.")
-    jerk_mm_s3: SlidingJerk | None = Field(default=None, description="Largest jerk, if known.")
-    track: tuple[RailBodyEntry, ...] = Field(
-        default=(), max_length=SOLID_LIMIT, description="Solids that stand still: ROBOT/track, ROBOT/track_2, …."
+    acceleration_mm_s2: SlidingAcceleration | None = setting(None, "Largest acceleration, if known.")
+    jerk_mm_s3: SlidingJerk | None = setting(None, "Largest jerk, if known.")
+    track: tuple[RailBodyEntry, ...] = setting(
+        (), "Solids that stand still: ROBOT/track, ROBOT/track_2, ….", max_length=SOLID_LIMIT
     )
-    carriage: tuple[RailBodyEntry, ...] = Field(
-        default=(), max_length=SOLID_LIMIT, description="Solids that ride along: ROBOT/carriage, ROBOT/carriage_2, …."
+    carriage: tuple[RailBodyEntry, ...] = setting(
+        (), "Solids that ride along: ROBOT/carriage, ROBOT/carriage_2, ….", max_length=SOLID_LIMIT
     )
 
     @model_validator(mode="after")
@@ -188,13 +185,13 @@ class MountEntry(OneOf):
 
     alternatives: ClassVar[tuple[str, ...]] = ("pedestal", "tilted", "hanging", "wall", "rail")
 
-    pedestal: PedestalEntry | None = Field(default=None, description="Upright on a pedestal, as with the key pedestal.")
-    tilted: PedestalEntry | None = Field(
-        default=None, description="Tilted on an upright column that is cut off along the plane of the base."
+    pedestal: PedestalEntry | None = setting(None, "Upright on a pedestal, as with the key pedestal.")
+    tilted: PedestalEntry | None = setting(
+        None, "Tilted on an upright column that is cut off along the plane of the base."
     )
-    hanging: HangingEntry | None = Field(default=None, description="Upside down below a ceiling.")
-    wall: WallEntry | None = Field(default=None, description="On a bracket behind its base, at a wall or elsewhere.")
-    rail: RailEntry | None = Field(default=None, description="On a carriage that moves along a rail.")
+    hanging: HangingEntry | None = setting(None, "Upside down below a ceiling.")
+    wall: WallEntry | None = setting(None, "On a bracket behind its base, at a wall or elsewhere.")
+    rail: RailEntry | None = setting(None, "On a carriage that moves along a rail.")
 
 
 class RobotEntry(Entry):
@@ -204,128 +201,115 @@ class RobotEntry(Entry):
         description="Bundled robot, or path of a URDF (.urdf, .xacro) or joint-axis table (.yaml) below the folder of "
         "the cell file."
     )
-    package_dirs: tuple[Text, ...] = Field(
-        default=(),
-        description="Folders in which package://NAME/... of a URDF and $(find NAME)/... of a xacro file are looked up "
-        "as FOLDER/NAME/....",
+    package_dirs: tuple[Text, ...] = setting(
+        (),
+        "Folders in which package://NAME/... of a URDF and $(find NAME)/... of a xacro file are looked up as "
+        "FOLDER/NAME/....",
     )
-    xacro_args: dict[str, XacroArgument] = Field(
-        default={},
-        description="Values of the arguments of a xacro file, by name; its own defaults where absent. Paths count "
-        "from the cell file.",
+    xacro_args: dict[str, XacroArgument] = setting(
+        {},
+        "Values of the arguments of a xacro file, by name; its own defaults where absent. Paths count from the cell "
+        "file.",
     )
-    flange: Text | None = Field(
-        default=None,
-        description="URDF link taken as the flange; when absent tool0, else flange, else the only last link, where its "
-        "z is along the last axis.",
+    flange: Text | None = setting(
+        None,
+        "URDF link taken as the flange; when absent tool0, else flange, else the only last link, where its z is along "
+        "the last axis.",
     )
-    base: PoseEntry = Field(
-        default=PoseEntry(), description="Pose of the robot's base (root link of a URDF) in the world."
+    base: PoseEntry = setting(PoseEntry(), "Pose of the robot's base (root link of a URDF) in the world.")
+    bodies: BodyAccuracyEntry | None = setting(
+        None, "How good its link bodies are; when absent what the robot's own file says."
     )
-    bodies: BodyAccuracyEntry | None = Field(
-        default=None, description="How good its link bodies are; when absent what the robot's own file says."
+    payload: PayloadEntry | None = setting(None, "What it may carry; when absent what the robot's own file says.")
+    srdf: Text | None = setting(
+        None,
+        "Path of an SRDF (.srdf, .xacro) for a URDF: pairs of its links that are not checked against each other, and "
+        "named configurations for start and home.",
     )
-    payload: PayloadEntry | None = Field(
-        default=None, description="What it may carry; when absent what the robot's own file says."
+    moveit_limits: Text | None = setting(
+        None,
+        "Path of a joint_limits.yaml of MoveIt for a URDF: limits by joint name, of which the tighter one counts "
+        "beside those of the URDF.",
     )
-    srdf: Text | None = Field(
-        default=None,
-        description="Path of an SRDF (.srdf, .xacro) for a URDF: pairs of its links that are not checked against each "
-        "other, and named configurations for start and home.",
+    gripper: GripperEntry | None = setting(
+        None, "The gripper that a URDF brings along: how far it is open, and what may work."
     )
-    moveit_limits: Text | None = Field(
-        default=None,
-        description="Path of a joint_limits.yaml of MoveIt for a URDF: limits by joint name, of which the tighter one "
-        "counts beside those of the URDF.",
+    pedestal: PedestalEntry | None = setting(
+        None, "Column or box from the floor to the base; it moves with the base and is judged like any body."
     )
-    gripper: GripperEntry | None = Field(
-        default=None, description="The gripper that a URDF brings along: how far it is open, and what may work."
+    mount: MountEntry | None = setting(
+        None, "How the base is mounted, with the bodies that this takes; excludes pedestal."
     )
-    pedestal: PedestalEntry | None = Field(
-        default=None,
-        description="Column or box from the floor to the base; it moves with the base and is judged like any body.",
+    tool: ToolEntry = setting(ToolEntry(), "What the robot carries; without it the flange is the tool tip.")
+    attachments: tuple[AttachmentEntry, ...] = setting(
+        (), "Solids mounted on links, such as hoses, feeders and valve blocks.", max_length=200
     )
-    mount: MountEntry | None = Field(
-        default=None, description="How the base is mounted, with the bodies that this takes; excludes pedestal."
+    start_deg: Configuration | None = setting(
+        None, "Start posture, one angle per joint, for robots with revolute joints only; auto finds one."
     )
-    tool: ToolEntry = Field(
-        default=ToolEntry(), description="What the robot carries; without it the flange is the tool tip."
+    start: NamedConfiguration | None = setting(
+        None,
+        "Start posture, one key per joint with its unit (a1_deg, rail_mm); auto finds one; else the name of a "
+        "configuration in the SRDF (STATE, or GROUP/STATE where several groups have one), with the rail of the cell "
+        "at zero or at its nearest limit. Excludes start_deg.",
     )
-    attachments: tuple[AttachmentEntry, ...] = Field(
-        default=(), max_length=200, description="Solids mounted on links, such as hoses, feeders and valve blocks."
+    home_deg: Configuration | None = setting(
+        None,
+        "Configuration in which the robot stands while it is idle, one angle per joint, for robots with revolute "
+        "joints only; auto finds one near the start.",
     )
-    start_deg: Configuration | None = Field(
-        default=None,
-        description="Start posture, one angle per joint, for robots with revolute joints only; auto finds one.",
+    home: NamedConfiguration | None = setting(
+        None, "The same with one key per joint with its unit (a1_deg, rail_mm), or by name; excludes home_deg."
     )
-    start: NamedConfiguration | None = Field(
-        default=None,
-        description="Start posture, one key per joint with its unit (a1_deg, rail_mm); auto finds one; else the name "
-        "of a configuration in the SRDF (STATE, or GROUP/STATE where several groups have one), with the rail of the "
-        "cell at zero or at its nearest limit. Excludes start_deg.",
-    )
-    home_deg: Configuration | None = Field(
-        default=None,
-        description="Configuration in which the robot stands while it is idle, one angle per joint, for robots with "
-        "revolute joints only; auto finds one near the start.",
-    )
-    home: NamedConfiguration | None = Field(
-        default=None,
-        description="The same with one key per joint with its unit (a1_deg, rail_mm), or by name; excludes home_deg.",
-    )
-    order: tuple[Name, ...] | None = Field(
-        default=None,
+    order: tuple[Name, ...] | None = setting(
+        None,
+        "Its tasks, and the marks of the program at which it waits, in their order; the order of the file, without "
+        "marks, when absent. Only with program.",
         max_length=ORDER_LIMIT,
-        description="Its tasks, and the marks of the program at which it waits, in their order; the order of the file, "
-        "without marks, when absent. Only with program.",
     )
-    available: bool = Field(
-        default=True,
-        description="Whether it can work. One that cannot stands at its home, and its tasks are open to the others: "
-        "`cellplan assign` gives them away.",
+    available: bool = setting(
+        True,
+        "Whether it can work. One that cannot stands at its home, and its tasks are open to the others: `cellplan "
+        "assign` gives them away.",
     )
-    joint_sums: tuple[JointSumEntry, ...] = Field(
-        default=(),
-        max_length=AXIS_LIMIT,
-        description="Ranges of sums of joint angles, such as a dress pack bears; checked at every row.",
+    joint_sums: tuple[JointSumEntry, ...] = setting(
+        (), "Ranges of sums of joint angles, such as a dress pack bears; checked at every row.", max_length=AXIS_LIMIT
     )
-    service: ServiceEntry | None = Field(
-        default=None,
-        description="How its tool is cleaned: on its way to a task with service among the via points before it, or "
-        "from one with it after. Only with program.",
+    service: ServiceEntry | None = setting(
+        None,
+        "How its tool is cleaned: on its way to a task with service among the via points before it, or from one with "
+        "it after. Only with program.",
     )
-    path: JointPathEntry | None = Field(
-        default=None,
-        description="Path of its joints over the common clock, for the first holder of the part only, in the mode "
-        "simultaneous; the other robots then follow their tasks by themselves.",
+    path: JointPathEntry | None = setting(
+        None,
+        "Path of its joints over the common clock, for the first holder of the part only, in the mode simultaneous; "
+        "the other robots then follow their tasks by themselves.",
     )
-    weights: tuple[Weight, ...] | None = Field(
-        default=None,
-        description="One positive weight per joint, ones when absent; a larger weight moves that joint less.",
+    weights: tuple[Weight, ...] | None = setting(
+        None, "One positive weight per joint, ones when absent; a larger weight moves that joint less."
     )
-    limits: dict[str, LimitsEntry] = Field(default={}, description="Limits by joint name, beside those of the model.")
-    acceleration: AccelerationChoice | None = Field(
-        default=None,
-        description="Accelerations that its joints are judged against; a stated limit of a joint counts first. "
-        "The cell's when absent.",
+    limits: dict[str, LimitsEntry] = setting({}, "Limits by joint name, beside those of the model.")
+    acceleration: AccelerationChoice | None = setting(
+        None,
+        "Accelerations that its joints are judged against; a stated limit of a joint counts first. The cell's when "
+        "absent.",
     )
-    controller_zero: Text | None = Field(
-        default=None,
-        description="Path of a YAML file that states how its controller counts the joints, with the keys that "
-        "controller has in a robot table; for a URDF, and for other robots whose own file does not state it.",
+    controller_zero: Text | None = setting(
+        None,
+        "Path of a YAML file that states how its controller counts the joints, with the keys that controller has in a "
+        "robot table; for a URDF, and for other robots whose own file does not state it.",
     )
-    controller: RobotControlEntry | None = Field(
-        default=None, description="Where it is connected, and how programs of its controller name things."
+    controller: RobotControlEntry | None = setting(
+        None, "Where it is connected, and how programs of its controller name things."
     )
-    controller_cycle_ms: CycleTime | None = Field(
-        default=None,
-        description="Cycle of its controller, over which jerk is taken; when absent that of the "
-        "key controller, else the motion's.",
+    controller_cycle_ms: CycleTime | None = setting(
+        None,
+        "Cycle of its controller, over which jerk is taken; when absent that of the key controller, else the motion's.",
     )
-    locked: dict[str, LockedPosition] = Field(
-        default={},
-        description="Positions of URDF joints that do not lead to the flange, by joint name with its unit (finger_mm); "
-        "`others: zero` holds all that are not named at zero, or at the nearest position within their limits.",
+    locked: dict[str, LockedPosition] = setting(
+        {},
+        "Positions of URDF joints that do not lead to the flange, by joint name with its unit (finger_mm); `others: "
+        "zero` holds all that are not named at zero, or at the nearest position within their limits.",
         json_schema_extra={
             "patternProperties": {
                 "_(deg|mm)$": {"type": "number", "minimum": -FARTHEST, "maximum": FARTHEST},

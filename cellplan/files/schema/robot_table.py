@@ -33,6 +33,7 @@ from cellplan.model.settings.entry import (
     Vector,
     by_kind,
     rule,
+    setting,
 )
 from cellplan.model.settings.robot import Accuracy, PayloadEntry, ReachEntry
 
@@ -45,21 +46,21 @@ class JointEntry(Entry):
 
     type: Literal["revolute", "prismatic"] = Field(description="How the joint moves.")
     axis: Vector = Field(description="Unit direction of the axis.")
-    point_mm: Coordinates = Field(default=ORIGIN, description="A point on the axis; required for a revolute joint.")
-    lower_deg: JointAngle | None = Field(default=None, description="Lowest angle of a revolute joint.")
-    upper_deg: JointAngle | None = Field(default=None, description="Highest angle of a revolute joint.")
-    velocity_deg_s: TurningSpeed | None = Field(default=None, description="Largest speed of a revolute joint.")
-    acceleration_deg_s2: TurningAcceleration | None = Field(
-        default=None, description="Largest acceleration of a revolute joint, if known."
+    point_mm: Coordinates = setting(ORIGIN, "A point on the axis; required for a revolute joint.")
+    lower_deg: JointAngle | None = setting(None, "Lowest angle of a revolute joint.")
+    upper_deg: JointAngle | None = setting(None, "Highest angle of a revolute joint.")
+    velocity_deg_s: TurningSpeed | None = setting(None, "Largest speed of a revolute joint.")
+    acceleration_deg_s2: TurningAcceleration | None = setting(
+        None, "Largest acceleration of a revolute joint, if known."
     )
-    jerk_deg_s3: TurningJerk | None = Field(default=None, description="Largest jerk of a revolute joint, if known.")
-    lower_mm: Coordinate | None = Field(default=None, description="Lowest position of a prismatic joint.")
-    upper_mm: Coordinate | None = Field(default=None, description="Highest position of a prismatic joint.")
-    velocity_mm_s: SlidingSpeed | None = Field(default=None, description="Largest speed of a prismatic joint.")
-    acceleration_mm_s2: SlidingAcceleration | None = Field(
-        default=None, description="Largest acceleration of a prismatic joint, if known."
+    jerk_deg_s3: TurningJerk | None = setting(None, "Largest jerk of a revolute joint, if known.")
+    lower_mm: Coordinate | None = setting(None, "Lowest position of a prismatic joint.")
+    upper_mm: Coordinate | None = setting(None, "Highest position of a prismatic joint.")
+    velocity_mm_s: SlidingSpeed | None = setting(None, "Largest speed of a prismatic joint.")
+    acceleration_mm_s2: SlidingAcceleration | None = setting(
+        None, "Largest acceleration of a prismatic joint, if known."
     )
-    jerk_mm_s3: SlidingJerk | None = Field(default=None, description="Largest jerk of a prismatic joint, if known.")
+    jerk_mm_s3: SlidingJerk | None = setting(None, "Largest jerk of a prismatic joint, if known.")
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -97,7 +98,7 @@ class PlacedBoxEntry(Entry):
 
     size_mm: tuple[Size, Size, Size] = Field(description="Edge lengths along its own x, y, z.")
     center_mm: Coordinates = Field(description="Centre.")
-    rpy_deg: Angles = Field(default=NOT_TURNED, description="Roll, pitch and yaw about fixed axes.")
+    rpy_deg: Angles = setting(NOT_TURNED, "Roll, pitch and yaw about fixed axes.")
 
 
 class PlacedSphereEntry(SphereEntry):
@@ -110,8 +111,8 @@ class PlacedMeshEntry(Entry):
     """A mesh in the base frame at the reference configuration."""
 
     file: Text = Field(description=f"{MESH_FILE}, relative to the table.")
-    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
-    at: PoseEntry = Field(default=PoseEntry(), description="Pose of the drawing in the base frame.")
+    unit: MeshUnit | None = setting(None, MESH_UNIT)
+    at: PoseEntry = setting(PoseEntry(), "Pose of the drawing in the base frame.")
 
     @model_validator(mode="after")
     def _has_unit(self) -> Self:
@@ -126,15 +127,14 @@ class LinkBodyEntry(OneOf):
     alternatives: ClassVar[tuple[str, ...]] = SOLID_SHAPES
 
     link: Text = Field(description="The word base, or the joint that carries the solid.")
-    name: Name | None = Field(default=None, description="Name in reports; the link's name, numbered, when absent.")
-    box: PlacedBoxEntry | None = Field(default=None, description="Cuboid.")
-    cylinder: SegmentEntry | None = Field(default=None, description="Cylinder with flat ends.")
-    capsule: SegmentEntry | None = Field(default=None, description="Cylinder with round ends beyond the segment.")
-    sphere: PlacedSphereEntry | None = Field(default=None, description="Ball.")
-    mesh: PlacedMeshEntry | None = Field(default=None, description="Mesh from a file.")
-    accuracy_mm: Accuracy | None = Field(
-        default=None,
-        description="How far the real link may stick out of this solid; when absent what is stated for all of them.",
+    name: Name | None = setting(None, "Name in reports; the link's name, numbered, when absent.")
+    box: PlacedBoxEntry | None = setting(None, "Cuboid.")
+    cylinder: SegmentEntry | None = setting(None, "Cylinder with flat ends.")
+    capsule: SegmentEntry | None = setting(None, "Cylinder with round ends beyond the segment.")
+    sphere: PlacedSphereEntry | None = setting(None, "Ball.")
+    mesh: PlacedMeshEntry | None = setting(None, "Mesh from a file.")
+    accuracy_mm: Accuracy | None = setting(
+        None, "How far the real link may stick out of this solid; when absent what is stated for all of them."
     )
 
     @model_validator(mode="after")
@@ -148,15 +148,12 @@ class LinkBodyEntry(OneOf):
 class BodiesEntry(Entry):
     """Solids of the links, with a statement on how good they are."""
 
-    accuracy_mm: Accuracy | None = Field(
-        default=None,
-        description="Largest distance by which the real arm sticks out of the solids; the report says so when absent.",
+    accuracy_mm: Accuracy | None = setting(
+        None, "Largest distance by which the real arm sticks out of the solids; the report says so when absent."
     )
-    source: Text = Field(default="not stated", description="Where the accuracy comes from.")
-    solids: tuple[LinkBodyEntry, ...] = Field(
-        default=(),
-        max_length=BODY_LIMIT,
-        description="Solids of the links, in the base frame at the reference configuration.",
+    source: Text = setting("not stated", "Where the accuracy comes from.")
+    solids: tuple[LinkBodyEntry, ...] = setting(
+        (), "Solids of the links, in the base frame at the reference configuration.", max_length=BODY_LIMIT
     )
 
 
@@ -172,26 +169,24 @@ class RobotTableDocument(Entry):
     """A whole robot file."""
 
     robot: Name = Field(description="Name of the robot model.")
-    source: Text = Field(default="not stated", description="Where the figures come from.")
+    source: Text = setting("not stated", "Where the figures come from.")
     joints: dict[Name, JointEntry] = Field(
         min_length=1, max_length=AXIS_LIMIT, description="Joints by name, from the base to the flange."
     )
     flange: PoseEntry = Field(
         description="Flange (mechanical interface) in the base frame at zero joints, z out of the flange."
     )
-    bodies: BodiesChoice = Field(
-        default=(),
-        description="Solids of the links, in the base frame at the reference configuration: a list of them, or a "
-        "mapping that also states their accuracy.",
+    bodies: BodiesChoice = setting(
+        (),
+        "Solids of the links, in the base frame at the reference configuration: a list of them, or a mapping that "
+        "also states their accuracy.",
     )
-    payload: PayloadEntry | None = Field(
-        default=None, description="What the robot may carry; the report says so when absent."
-    )
-    reach: ReachEntry | None = Field(default=None, description="Reach as the maker publishes it, if known.")
-    controller: ControllerZeroEntry | None = Field(
-        default=None,
-        description="How its controller counts the joints; when absent the zero of the model is taken as the "
-        "controller's, and the report says so. Without keys: known to be the same.",
+    payload: PayloadEntry | None = setting(None, "What the robot may carry; the report says so when absent.")
+    reach: ReachEntry | None = setting(None, "Reach as the maker publishes it, if known.")
+    controller: ControllerZeroEntry | None = setting(
+        None,
+        "How its controller counts the joints; when absent the zero of the model is taken as the controller's, and "
+        "the report says so. Without keys: known to be the same.",
     )
 
     @property

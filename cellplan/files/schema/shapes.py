@@ -4,7 +4,7 @@ from typing import ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cellplan.model.settings.entry import AxisName, Coordinate, Entry, OneOf, PoseEntry, Size, Text, rule
+from cellplan.model.settings.entry import AxisName, Coordinate, Entry, OneOf, PoseEntry, Size, Text, rule, setting
 
 SOLID_SHAPES: Final = ("box", "cylinder", "capsule", "sphere", "mesh")
 
@@ -20,7 +20,7 @@ class CylinderEntry(Entry):
 
     radius_mm: Size = Field(description="Radius.")
     length_mm: Size = Field(description="Length along its axis.")
-    axis: AxisName = Field(default="z", description="Direction of its axis.")
+    axis: AxisName = setting("z", "Direction of its axis.")
 
 
 class RoundEnds(Entry):
@@ -40,7 +40,7 @@ class RoundEnds(Entry):
 class CapsuleEntry(RoundEnds):
     """A cylinder with round ends, centred on its frame."""
 
-    axis: AxisName = Field(default="z", description="Direction of its axis.")
+    axis: AxisName = setting("z", "Direction of its axis.")
 
 
 class SphereEntry(Entry):
@@ -106,11 +106,11 @@ class PartShapeEntry(OneShape):
 
     alternatives: ClassVar[tuple[str, ...]] = ("box", "cylinder", "sphere", "mesh")
 
-    box: BoxEntry | None = Field(default=None, description="Cuboid centred on the part frame.")
-    cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder centred on the part frame.")
-    sphere: SphereEntry | None = Field(default=None, description="Ball centred on the part frame.")
-    mesh: Text | None = Field(default=None, description=f"{MESH_FILE} of a closed surface, drawn in the part frame.")
-    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
+    box: BoxEntry | None = setting(None, "Cuboid centred on the part frame.")
+    cylinder: CylinderEntry | None = setting(None, "Circular cylinder centred on the part frame.")
+    sphere: SphereEntry | None = setting(None, "Ball centred on the part frame.")
+    mesh: Text | None = setting(None, f"{MESH_FILE} of a closed surface, drawn in the part frame.")
+    unit: MeshUnit | None = setting(None, MESH_UNIT)
 
 
 class ToolShapeEntry(OneShape):
@@ -118,19 +118,13 @@ class ToolShapeEntry(OneShape):
 
     alternatives: ClassVar[tuple[str, ...]] = SOLID_SHAPES
 
-    box: BoxEntry | None = Field(
-        default=None, description="Cuboid; along the tool's z axis it reaches from -size to 0."
-    )
-    cylinder: ToolRoundEntry | None = Field(
-        default=None, description="Cylinder along the tool's z axis, from -length to 0."
-    )
-    capsule: ToolCapsuleEntry | None = Field(
-        default=None, description="Capsule along the tool's z axis, from -length to 0."
-    )
-    sphere: SphereEntry | None = Field(default=None, description="Ball that touches the tool tip from behind.")
-    mesh: Text | None = Field(default=None, description=f"{MESH_FILE}, drawn in the flange frame.")
-    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
-    open: bool | None = Field(default=None, description=OPEN_MESH)
+    box: BoxEntry | None = setting(None, "Cuboid; along the tool's z axis it reaches from -size to 0.")
+    cylinder: ToolRoundEntry | None = setting(None, "Cylinder along the tool's z axis, from -length to 0.")
+    capsule: ToolCapsuleEntry | None = setting(None, "Capsule along the tool's z axis, from -length to 0.")
+    sphere: SphereEntry | None = setting(None, "Ball that touches the tool tip from behind.")
+    mesh: Text | None = setting(None, f"{MESH_FILE}, drawn in the flange frame.")
+    unit: MeshUnit | None = setting(None, MESH_UNIT)
+    open: bool | None = setting(None, OPEN_MESH)
 
 
 class SolidEntry(OneShape):
@@ -138,26 +132,26 @@ class SolidEntry(OneShape):
 
     alternatives: ClassVar[tuple[str, ...]] = SOLID_SHAPES
 
-    box: BoxEntry | None = Field(default=None, description="Cuboid.")
-    cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder.")
-    capsule: CapsuleEntry | None = Field(default=None, description="Cylinder with round ends.")
-    sphere: SphereEntry | None = Field(default=None, description="Ball.")
-    mesh: Text | None = Field(default=None, description=f"{MESH_FILE}.")
-    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
-    open: bool | None = Field(default=None, description=OPEN_MESH)
+    box: BoxEntry | None = setting(None, "Cuboid.")
+    cylinder: CylinderEntry | None = setting(None, "Circular cylinder.")
+    capsule: CapsuleEntry | None = setting(None, "Cylinder with round ends.")
+    sphere: SphereEntry | None = setting(None, "Ball.")
+    mesh: Text | None = setting(None, f"{MESH_FILE}.")
+    unit: MeshUnit | None = setting(None, MESH_UNIT)
+    open: bool | None = setting(None, OPEN_MESH)
     at: PoseEntry | None = None
 
 
 class ToolBodyEntry(SolidEntry):
     """A further solid of a tool, given in the flange frame."""
 
-    at: PoseEntry = Field(default=PoseEntry(), description="Pose of the solid in the flange frame.")
+    at: PoseEntry = setting(PoseEntry(), "Pose of the solid in the flange frame.")
 
 
 class _Floor(Entry):
     """The first key of an obstacle."""
 
-    plane: PlaneEntry | None = Field(default=None, description="Floor of the cell.")
+    plane: PlaneEntry | None = setting(None, "Floor of the cell.")
 
 
 class ObstacleEntry(SolidEntry, _Floor):
@@ -165,8 +159,8 @@ class ObstacleEntry(SolidEntry, _Floor):
 
     alternatives: ClassVar[tuple[str, ...]] = ("plane", *SOLID_SHAPES)
 
-    at: PoseEntry | None = Field(
-        default=None, description="Pose of the shape in the world; the world frame when absent. Not with a plane."
+    at: PoseEntry | None = setting(
+        None, "Pose of the shape in the world; the world frame when absent. Not with a plane."
     )
 
     @model_validator(mode="after")

@@ -20,6 +20,7 @@ from cellplan.model.settings.entry import (
     by_kind,
     require_unique,
     rule,
+    setting,
 )
 from cellplan.model.settings.robot import JointPosition
 from cellplan.model.settings.task import (
@@ -69,8 +70,8 @@ OneRobot = Annotated[
 class RampEntry(Entry):
     """Settings of the trapezoid law."""
 
-    ramp: Annotated[float, Field(gt=0.0, le=0.5)] = Field(
-        default=0.25, description="Share of the time of each stretch spent speeding up, and the same slowing down."
+    ramp: Annotated[float, Field(gt=0.0, le=0.5)] = setting(
+        0.25, "Share of the time of each stretch spent speeding up, and the same slowing down."
     )
 
 
@@ -122,8 +123,8 @@ class ViaEntry(Entry):
     In that of its service it stands for as long as that takes.
     """
 
-    before: ViaPoints = Field(default=(), description="On its way to the task.")
-    after: ViaPoints = Field(default=(), description="On its way from the task.")
+    before: ViaPoints = setting((), "On its way to the task.")
+    after: ViaPoints = setting((), "On its way from the task.")
 
 
 StandOff = Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
@@ -137,142 +138,121 @@ class TaskEntry(Entry):
         description="Robot that does the task, or any, or a list of robots for `cellplan assign` to choose from; "
         "without program a robot has at most one."
     )
-    relative_to: Literal["part", "world"] = Field(
-        default="part",
-        description="Frame that path, tool axis and axes are given in. With world, a robot that holds the part (the "
-        "first under held_by) carries it along the path; any other moves its tool through the cell.",
+    relative_to: Literal["part", "world"] = setting(
+        "part",
+        "Frame that path, tool axis and axes are given in. With world, a robot that holds the part (the first under "
+        "held_by) carries it along the path; any other moves its tool through the cell.",
     )
-    after: AfterChoice | None = Field(
-        default=None, description="Tasks, of any robots, that must be done before this one begins; only with program."
+    after: AfterChoice | None = setting(
+        None, "Tasks, of any robots, that must be done before this one begins; only with program."
     )
-    start_deg: Configuration | None = Field(
-        default=None,
-        description="Start posture of its robot for this task, one angle per joint; auto finds one. When absent that "
-        "of the robot for its first task, and auto for later ones. Only with program.",
+    start_deg: Configuration | None = setting(
+        None,
+        "Start posture of its robot for this task, one angle per joint; auto finds one. When absent that of the robot "
+        "for its first task, and auto for later ones. Only with program.",
     )
-    start: PositionChoice | None = Field(
-        default=None, description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes start_deg."
+    start: PositionChoice | None = setting(
+        None, "The same with one key per joint with its unit (a1_deg, rail_mm); excludes start_deg."
     )
-    holder_deg: tuple[Angle, ...] | None = Field(
-        default=None,
-        description="Configuration of the first holder in which this task begins, and in which it is done in the "
-        "modes part_at_rest and semi_coordinated; the holder's start posture when absent. Only with program.",
+    holder_deg: tuple[Angle, ...] | None = setting(
+        None,
+        "Configuration of the first holder in which this task begins, and in which it is done in the modes "
+        "part_at_rest and semi_coordinated; the holder's start posture when absent. Only with program.",
     )
-    holder: dict[str, JointPosition] | None = Field(
-        default=None,
-        min_length=1,
-        description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes holder_deg.",
+    holder: dict[str, JointPosition] | None = setting(
+        None, "The same with one key per joint with its unit (a1_deg, rail_mm); excludes holder_deg.", min_length=1
     )
-    holder_moves: bool | None = Field(
-        default=None,
-        description="Whether the first holder moves while the task is done, from that configuration on, in the mode "
+    holder_moves: bool | None = setting(
+        None,
+        "Whether the first holder moves while the task is done, from that configuration on, in the mode "
         "semi_coordinated: as much of the motion as it can is its own, as the joint weights of the other robots count "
         "a thousandfold. Tasks that begin together all have it or none. false when absent.",
     )
-    via: ViaEntry | None = Field(
-        default=None,
-        description="Configurations that its robot passes in the transfer moves to the task and from it; only with "
-        "program.",
+    via: ViaEntry | None = setting(
+        None, "Configurations that its robot passes in the transfer moves to the task and from it; only with program."
     )
     path: PathEntry = Field(description="Path of the tool tip on the part.")
-    tool_axis: ToolAxis | None = Field(
-        default=None,
-        description="Direction of the tool's z axis in the part frame; normal, the default, points into the surface or "
-        "takes the file's orientations.",
+    tool_axis: ToolAxis | None = setting(
+        None,
+        "Direction of the tool's z axis in the part frame; normal, the default, points into the surface or takes the "
+        "file's orientations.",
     )
-    tool_x: Direction = Field(
-        default="+x",
-        description="Direction in the part frame onto which the tool's x axis is aligned as closely as possible.",
+    tool_x: Direction = setting(
+        "+x", "Direction in the part frame onto which the tool's x axis is aligned as closely as possible."
     )
-    spin_deg: Angle = Field(
-        default=Deg(0.0),
-        description="Angle by which the tool is turned about its own z axis, all along the path, from where tool_x "
-        "leads it.",
+    spin_deg: Angle = setting(
+        Deg(0.0),
+        "Angle by which the tool is turned about its own z axis, all along the path, from where tool_x leads it.",
     )
-    tool_turn_deg: Angle = Field(
-        default=Deg(0.0),
-        description="Angle by which the tool turns about its own z axis, evenly over the length of the path, "
-        "and on by as much in every further cycle.",
+    tool_turn_deg: Angle = setting(
+        Deg(0.0),
+        "Angle by which the tool turns about its own z axis, evenly over the length of the path, and on by as much in "
+        "every further cycle.",
     )
-    axes: tuple[TaskAxis, ...] = Field(
-        default=("x", "y", "z", "rx", "ry", "rz"),
+    axes: tuple[TaskAxis, ...] = setting(
+        ("x", "y", "z", "rx", "ry", "rz"),
+        "Components of the motion that are prescribed, in the part frame.",
         min_length=1,
-        description="Components of the motion that are prescribed, in the part frame.",
     )
-    free: tuple[Literal["spin"], ...] = Field(
-        default=(), description="[spin] leaves the rotation about the tool's z axis open."
+    free: tuple[Literal["spin"], ...] = setting((), "[spin] leaves the rotation about the tool's z axis open.")
+    tolerance: ToleranceEntry = setting(ToleranceEntry(), "Largest allowed tool error.")
+    start_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] | None = setting(
+        None, "Start of the path on the common clock; when absent 0, or the end of the approach."
     )
-    tolerance: ToleranceEntry = Field(default=ToleranceEntry(), description="Largest allowed tool error.")
-    start_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] | None = Field(
-        default=None, description="Start of the path on the common clock; when absent 0, or the end of the approach."
+    duration_s: Seconds | None = setting(
+        None,
+        "Time for the whole path, all cycles together; when absent what motion.duration_s leaves. Excludes feed_mm_s.",
     )
-    duration_s: Seconds | None = Field(
-        default=None,
-        description="Time for the whole path, all cycles together; when absent what motion.duration_s leaves. Excludes "
-        "feed_mm_s.",
+    feed_mm_s: SlidingSpeed | None = setting(None, "Largest speed along the path on the surface; excludes duration_s.")
+    process: ProcessEntry | None = setting(
+        None,
+        "Process with a demanded feed; it is on from the start of the path, when an approach is over, to its end. "
+        "Excludes duration_s, feed_mm_s, time_law and settle_s.",
     )
-    feed_mm_s: SlidingSpeed | None = Field(
-        default=None, description="Largest speed along the path on the surface; excludes duration_s."
+    dwell_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = setting(
+        0.0, "Time for which the tool rests at the end of its path, the process off, before it leaves."
     )
-    process: ProcessEntry | None = Field(
-        default=None,
-        description="Process with a demanded feed; it is on from the start of the path, when an approach is over, to "
-        "its end. Excludes duration_s, feed_mm_s, time_law and settle_s.",
+    repeat: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = setting(
+        1, "Number of cycles along the path; more than one only for a closed path."
     )
-    dwell_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
-        default=0.0,
-        description="Time for which the tool rests at the end of its path, the process off, before it leaves.",
+    approach_mm: StandOff = setting(
+        Mm(0.0),
+        "Distance from which the tool approaches the start of its path, along its own axis. With program the default "
+        "is 30 for a task on the part.",
     )
-    repeat: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
-        default=1, description="Number of cycles along the path; more than one only for a closed path."
+    approach_s: Seconds = setting(0.5, "Time for the approach, which ends when the path starts.")
+    retract_mm: StandOff = setting(
+        Mm(0.0),
+        "Distance to which the tool retracts from the end of its path, along its own axis. With program the default "
+        "is 30 for a task on the part.",
     )
-    approach_mm: StandOff = Field(
-        default=Mm(0.0),
-        description="Distance from which the tool approaches the start of its path, along its own axis. With program "
-        "the default is 30 for a task on the part.",
+    retract_s: Seconds = setting(0.5, "Time for the retraction.")
+    settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = setting(
+        0.0,
+        "Time after the start during which the tool may converge to its path: its error is reported and not judged. "
+        "Shorter than the task.",
     )
-    approach_s: Seconds = Field(default=0.5, description="Time for the approach, which ends when the path starts.")
-    retract_mm: StandOff = Field(
-        default=Mm(0.0),
-        description="Distance to which the tool retracts from the end of its path, along its own axis. With program "
-        "the default is 30 for a task on the part.",
+    tool_depth_mm: ToolDepth | None = setting(
+        None, "Largest depth of the tool in the part, for processes that cut; checks.tool_depth_mm when absent."
     )
-    retract_s: Seconds = Field(default=0.5, description="Time for the retraction.")
-    settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
-        default=0.0,
-        description="Time after the start during which the tool may converge to its path: its error is reported "
-        "and not judged. Shorter than the task.",
+    standoff_mm: tuple[StandOff, StandOff] | None = setting(
+        None,
+        "Smallest and largest distance of the tool tip from the part along the path, below the surface to "
+        "tool_depth_mm: along the tool's axis, or to the nearest point where the smallest is 0. When absent a tip "
+        "with a process is within 2 mm of the part.",
     )
-    tool_depth_mm: ToolDepth | None = Field(
-        default=None,
-        description="Largest depth of the tool in the part, for processes that cut; checks.tool_depth_mm when absent.",
+    torch: TorchEntry | None = setting(None, "How the tool is held to gravity along the path; anyhow when absent.")
+    weld_position: WeldPositionEntry | None = setting(
+        None, "How the weld lies to gravity along the path; anyhow when absent."
     )
-    standoff_mm: tuple[StandOff, StandOff] | None = Field(
-        default=None,
-        description="Smallest and largest distance of the tool tip from the part along the path, below the surface to "
-        "tool_depth_mm: along the tool's axis, or to the nearest point where the smallest is 0. When absent a tip with "
-        "a process is within 2 mm of the part.",
+    tack: bool = setting(False, "Whether it is a tack, which program.tacks_first has before all seams.")
+    off_part: tuple[Literal["run_in", "run_out", "cut"], ...] = setting(
+        (),
+        "Stretches of the path on which the tip need not keep that distance: its begin, its end, and where a cut "
+        "leaves the part between them.",
     )
-    torch: TorchEntry | None = Field(
-        default=None, description="How the tool is held to gravity along the path; anyhow when absent."
-    )
-    weld_position: WeldPositionEntry | None = Field(
-        default=None, description="How the weld lies to gravity along the path; anyhow when absent."
-    )
-    tack: bool = Field(
-        default=False, description="Whether it is a tack, which program.tacks_first has before all seams."
-    )
-    off_part: tuple[Literal["run_in", "run_out", "cut"], ...] = Field(
-        default=(),
-        description="Stretches of the path on which the tip need not keep that distance: its begin, its end, and where "
-        "a cut leaves the part between them.",
-    )
-    time_law: TimeLawChoice | None = Field(
-        default=None, description="Law of each stretch between stops; the motion's when absent."
-    )
-    corners: CornerChoice | None = Field(
-        default=None, description="Stop at corners or round them; the motion's when absent."
-    )
+    time_law: TimeLawChoice | None = setting(None, "Law of each stretch between stops; the motion's when absent.")
+    corners: CornerChoice | None = setting(None, "Stop at corners or round them; the motion's when absent.")
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:

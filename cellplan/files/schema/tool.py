@@ -5,7 +5,7 @@ from typing import Annotated, Final, Self
 from pydantic import Field, model_validator
 
 from cellplan.files.schema.shapes import ToolBodyEntry, ToolShapeEntry
-from cellplan.model.settings.entry import Coordinates, Entry, FrameAngle, PoseEntry, Size, rule
+from cellplan.model.settings.entry import Coordinates, Entry, FrameAngle, PoseEntry, Size, rule, setting
 from cellplan.model.settings.robot import HEAVIEST_KG
 from cellplan.model.settings.units import Deg, Mm, Within
 
@@ -26,22 +26,20 @@ class RodEntry(Entry):
     """A round rod from the centre of the flange to the tool tip: the tip frame and the solids follow from it."""
 
     length_mm: Size = Field(description="Length from the centre of the flange to the tip.")
-    tilt_deg: Annotated[Deg, Within(ge=-WIDEST_TILT_DEG, le=WIDEST_TILT_DEG)] = Field(
-        default=Deg(0.0),
-        description="Angle between the rod and the flange's z axis, about the flange's y axis turned by roll_deg.",
+    tilt_deg: Annotated[Deg, Within(ge=-WIDEST_TILT_DEG, le=WIDEST_TILT_DEG)] = setting(
+        Deg(0.0), "Angle between the rod and the flange's z axis, about the flange's y axis turned by roll_deg."
     )
-    roll_deg: FrameAngle = Field(
-        default=Deg(0.0),
-        description="Angle about the flange's z axis: the tip frame is turned by rpy_deg: [0, tilt, roll].",
+    roll_deg: FrameAngle = setting(
+        Deg(0.0), "Angle about the flange's z axis: the tip frame is turned by rpy_deg: [0, tilt, roll]."
     )
     radius_mm: Size = Field(description="Radius of the rod, which has round ends.")
-    stick_out_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = Field(
-        default=Mm(0.0), description="How far the tip lies beyond the end of the rod, as the wire of a torch does."
+    stick_out_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = setting(
+        Mm(0.0), "How far the tip lies beyond the end of the rod, as the wire of a torch does."
     )
-    holder: RodHolderEntry | None = Field(
-        default=None,
-        description="Cylinder on the flange that holds the rod, which then begins one radius above the middle of the "
-        "cylinder; a rod without one begins at the flange.",
+    holder: RodHolderEntry | None = setting(
+        None,
+        "Cylinder on the flange that holds the rod, which then begins one radius above the middle of the cylinder; a "
+        "rod without one begins at the flange.",
     )
 
     @property
@@ -62,18 +60,16 @@ class RodEntry(Entry):
 class ToolEntry(PoseEntry):
     """A tool: its tip in the flange frame, z out of the tool, and its solids; or a rod."""
 
-    rod: RodEntry | None = Field(
-        default=None, description="Rod that ends at the tool tip, with its holder; excludes xyz_mm, rpy_deg, geometry."
+    rod: RodEntry | None = setting(
+        None, "Rod that ends at the tool tip, with its holder; excludes xyz_mm, rpy_deg, geometry."
     )
-    geometry: ToolShapeEntry | None = Field(
-        default=None, description="Shape that ends at the tool tip; none when absent."
+    geometry: ToolShapeEntry | None = setting(None, "Shape that ends at the tool tip; none when absent.")
+    bodies: tuple[ToolBodyEntry, ...] = setting((), "Further solids, placed in the flange frame.")
+    mass_kg: Mass | None = setting(
+        None, "Mass, for the payload and for weights that grow with the load; absent: not stated."
     )
-    bodies: tuple[ToolBodyEntry, ...] = Field(default=(), description="Further solids, placed in the flange frame.")
-    mass_kg: Mass | None = Field(
-        default=None, description="Mass, for the payload and for weights that grow with the load; absent: not stated."
-    )
-    centre_mm: Coordinates | None = Field(
-        default=None, description="Centre of mass in the flange frame, for the payload; the tool tip when absent."
+    centre_mm: Coordinates | None = setting(
+        None, "Centre of mass in the flange frame, for the payload; the tool tip when absent."
     )
 
     @model_validator(mode="after")

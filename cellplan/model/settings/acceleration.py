@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Final, Literal
 
 from pydantic import Field, Tag
 
-from cellplan.model.settings.entry import OneOf, Reason, by_kind
+from cellplan.model.settings.entry import OneOf, Reason, by_kind, setting
 from cellplan.model.settings.units import Ms, Within
 
 AXES: Final = 64  # joints of one robot
@@ -25,14 +25,12 @@ class AccelerationRuleEntry(OneOf):
 
     alternatives: ClassVar[tuple[str, ...]] = ("full_speed_in_s", "unlimited")
 
-    full_speed_in_s: SpeedUpTimes | None = Field(
-        default=None,
-        description="Time in which a joint without a stated limit is taken to reach its top speed: one for all joints, "
-        "or a list along the chain whose last entry counts for all further joints.",
+    full_speed_in_s: SpeedUpTimes | None = setting(
+        None,
+        "Time in which a joint without a stated limit is taken to reach its top speed: one for all joints, or a list "
+        "along the chain whose last entry counts for all further joints.",
     )
-    unlimited: Reason | None = Field(
-        default=None, description="Accelerations and jerk are reported and not judged; the reason why."
-    )
+    unlimited: Reason | None = setting(None, "Accelerations and jerk are reported and not judged; the reason why.")
 
 
 AccelerationChoice = Annotated[

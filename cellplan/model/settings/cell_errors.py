@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Final, Literal
 
 from pydantic import Field, Tag
 
-from cellplan.model.settings.entry import NOT_TURNED, ORIGIN, Entry, Name, OneOf, by_kind
+from cellplan.model.settings.entry import NOT_TURNED, ORIGIN, Entry, Name, OneOf, by_kind, setting
 from cellplan.model.settings.solver import LARGEST_SEED
 from cellplan.model.settings.units import Deg, Mm, Quantity, Within
 
@@ -31,15 +31,15 @@ class Spread(OneOf):
 class ShiftSpreadEntry(Spread):
     """A length that varies from trial to trial, with mean zero."""
 
-    normal: ShiftWidth | None = Field(default=None, description="Standard deviation of a normal distribution.")
-    uniform: ShiftWidth | None = Field(default=None, description="Half width of a uniform distribution.")
+    normal: ShiftWidth | None = setting(None, "Standard deviation of a normal distribution.")
+    uniform: ShiftWidth | None = setting(None, "Half width of a uniform distribution.")
 
 
 class TurnSpreadEntry(Spread):
     """An angle that varies from trial to trial, with mean zero."""
 
-    normal: TurnWidth | None = Field(default=None, description="Standard deviation of a normal distribution.")
-    uniform: TurnWidth | None = Field(default=None, description="Half width of a uniform distribution.")
+    normal: TurnWidth | None = setting(None, "Standard deviation of a normal distribution.")
+    uniform: TurnWidth | None = setting(None, "Half width of a uniform distribution.")
 
 
 ShiftAmount = Annotated[
@@ -56,32 +56,29 @@ Amount = Quantity | Spread
 class PoseErrorEntry(Entry):
     """Pose of an actual frame in the nominal one."""
 
-    xyz_mm: tuple[ShiftAmount, ShiftAmount, ShiftAmount] = Field(default=ORIGIN, description="Position.")
-    rpy_deg: tuple[TurnAmount, TurnAmount, TurnAmount] = Field(
-        default=NOT_TURNED, description="Roll, pitch and yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll)."
+    xyz_mm: tuple[ShiftAmount, ShiftAmount, ShiftAmount] = setting(ORIGIN, "Position.")
+    rpy_deg: tuple[TurnAmount, TurnAmount, TurnAmount] = setting(
+        NOT_TURNED, "Roll, pitch and yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll)."
     )
 
 
 class RobotErrorsEntry(Entry):
     """Deviations of one robot from its data sheet and its pose."""
 
-    joint_offsets_deg: dict[str, TurnAmount] = Field(
-        default={}, description="Actual minus commanded angle of revolute joints, by joint name."
+    joint_offsets_deg: dict[str, TurnAmount] = setting(
+        {}, "Actual minus commanded angle of revolute joints, by joint name."
     )
-    joint_offsets_mm: dict[str, ShiftAmount] = Field(
-        default={}, description="Actual minus commanded position of prismatic joints, by joint name."
+    joint_offsets_mm: dict[str, ShiftAmount] = setting(
+        {}, "Actual minus commanded position of prismatic joints, by joint name."
     )
-    link_lengths_mm: dict[str, ShiftAmount] = Field(
-        default={},
-        description="Excess length of the link before a joint: the joint's axis point, and everything after it, "
-        "moves away from the axis point of the joint before (from the base frame's origin for the first joint).",
+    link_lengths_mm: dict[str, ShiftAmount] = setting(
+        {},
+        "Excess length of the link before a joint: the joint's axis point, and everything after it, moves away from "
+        "the axis point of the joint before (from the base frame's origin for the first joint).",
     )
-    base: PoseErrorEntry = Field(
-        default=PoseErrorEntry(), description="Pose of the actual base in the nominal base frame."
-    )
-    tool: PoseErrorEntry = Field(
-        default=PoseErrorEntry(),
-        description="Pose of the actual tool tip in the nominal tool frame, z out of the tool.",
+    base: PoseErrorEntry = setting(PoseErrorEntry(), "Pose of the actual base in the nominal base frame.")
+    tool: PoseErrorEntry = setting(
+        PoseErrorEntry(), "Pose of the actual tool tip in the nominal tool frame, z out of the tool."
     )
 
     @property
@@ -93,11 +90,9 @@ class RobotErrorsEntry(Entry):
 class MeasurementEntry(Entry):
     """The measuring system that measures the tools relative to the part."""
 
-    position_noise_mm: ShiftWidth = Field(
-        default=Mm(0.0), description="Standard deviation of each measured coordinate of a tool tip."
-    )
-    orientation_noise_deg: TurnWidth = Field(
-        default=Deg(0.0), description="Standard deviation of each measured small turn about the part's axes."
+    position_noise_mm: ShiftWidth = setting(Mm(0.0), "Standard deviation of each measured coordinate of a tool tip.")
+    orientation_noise_deg: TurnWidth = setting(
+        Deg(0.0), "Standard deviation of each measured small turn about the part's axes."
     )
 
 
@@ -105,15 +100,14 @@ class ErrorsDocument(Entry):
     """A whole errors file."""
 
     cellplan_errors: Literal[1] = Field(description="Version of the format.")
-    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(default=0, description="Seed of all samples.")
-    trials: Annotated[int, Field(ge=1, le=TRIAL_LIMIT)] = Field(
-        default=1, description="Number of sampled cells, where an amount is a distribution."
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = setting(0, "Seed of all samples.")
+    trials: Annotated[int, Field(ge=1, le=TRIAL_LIMIT)] = setting(
+        1, "Number of sampled cells, where an amount is a distribution."
     )
-    robots: dict[Name, RobotErrorsEntry] = Field(
-        default={}, description="Errors of the cell's robots by name; a robot that is not named is exact."
+    robots: dict[Name, RobotErrorsEntry] = setting(
+        {}, "Errors of the cell's robots by name; a robot that is not named is exact."
     )
-    grasp: dict[Name, PoseErrorEntry] = Field(
-        default={},
-        description="Pose of the actual part in the nominal part frame, by the name of the robot that holds it.",
+    grasp: dict[Name, PoseErrorEntry] = setting(
+        {}, "Pose of the actual part in the nominal part frame, by the name of the robot that holds it."
     )
-    measurement: MeasurementEntry = Field(default=MeasurementEntry(), description="Noise of the measuring system.")
+    measurement: MeasurementEntry = setting(MeasurementEntry(), "Noise of the measuring system.")

@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cellplan.model.settings.entry import Entry, Reason, SlidingSpeed, Text, rule
+from cellplan.model.settings.entry import Entry, Reason, SlidingSpeed, Text, rule, setting
 from cellplan.model.settings.units import Deg, Mm, Within
 
 WIDEST_CONTACT_MM: Final = 50.0  # farther from its tip a tool that touches the part collides with it
@@ -33,11 +33,11 @@ class ExclusionEntry(Entry):
 class StopEntry(Entry):
     """What is demanded when one robot stops and the robots of other controllers go on until they have braked."""
 
-    depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] | None = Field(
-        default=None, description="Largest depth of a tool in the part; it is only reported when absent."
+    depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] | None = setting(
+        None, "Largest depth of a tool in the part; it is only reported when absent."
     )
-    clearance_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] | None = Field(
-        default=None, description="Smallest distance of all that must not touch; it is only reported when absent."
+    clearance_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] | None = setting(
+        None, "Smallest distance of all that must not touch; it is only reported when absent."
     )
 
     @model_validator(mode="after")
@@ -51,46 +51,45 @@ class StopEntry(Entry):
 class ChecksEntry(Entry):
     """Requirements of the checks."""
 
-    clearance_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = Field(
-        default=Mm(5.0), description="Smallest allowed distance between things that must not touch."
+    clearance_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = setting(
+        Mm(5.0), "Smallest allowed distance between things that must not touch."
     )
-    body_accuracy: Literal["report", "add"] = Field(
-        default="report",
-        description="What to do with the stated accuracy of link bodies: report it beside the distances, or add that "
-        "of both bodies to the demanded clearance of each pair.",
+    body_accuracy: Literal["report", "add"] = setting(
+        "report",
+        "What to do with the stated accuracy of link bodies: report it beside the distances, or add that of both "
+        "bodies to the demanded clearance of each pair.",
     )
-    contact_zone_mm: Annotated[Mm, Within(ge=0.0, le=WIDEST_CONTACT_MM)] = Field(
-        default=Mm(20.0), description="Radius round the tool tip within which tool and part may touch."
+    contact_zone_mm: Annotated[Mm, Within(ge=0.0, le=WIDEST_CONTACT_MM)] = setting(
+        Mm(20.0), "Radius round the tool tip within which tool and part may touch."
     )
-    tool_depth_mm: ToolDepth = Field(
-        default=Mm(1.0),
-        description="Largest length of tool inside the part or beyond it, along the tool's axis from where it enters.",
+    tool_depth_mm: ToolDepth = setting(
+        Mm(1.0), "Largest length of tool inside the part or beyond it, along the tool's axis from where it enters."
     )
-    closure_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] = Field(
-        default=Mm(0.003), description="Largest distance of a further holder's tool from its grasp on the part."
+    closure_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] = setting(
+        Mm(0.003), "Largest distance of a further holder's tool from its grasp on the part."
     )
-    closure_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] = Field(
-        default=Deg(0.001), description="Largest angle between a further holder's tool and its grasp on the part."
+    closure_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] = setting(
+        Deg(0.001), "Largest angle between a further holder's tool and its grasp on the part."
     )
-    standing_depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = Field(
-        default=Mm(5.0),
-        description="How deep bodies that never move may reach into each other where one stands on the other: a base "
-        "in a floor or plinth, a fixed part on a table.",
+    standing_depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = setting(
+        Mm(5.0),
+        "How deep bodies that never move may reach into each other where one stands on the other: a base in a floor "
+        "or plinth, a fixed part on a table.",
     )
-    part_acceleration_m_s2: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = Field(
-        default=None,
-        description="Largest allowed acceleration in the world of any corner of the bounding box of a part that is "
-        "held; it is only reported when absent.",
+    part_acceleration_m_s2: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = setting(
+        None,
+        "Largest allowed acceleration in the world of any corner of the bounding box of a part that is held; it is "
+        "only reported when absent.",
     )
-    tool_speed_mm_s: SlidingSpeed | None = Field(
-        default=None, description="Largest allowed speed of any tool tip in the world; it is only reported when absent."
+    tool_speed_mm_s: SlidingSpeed | None = setting(
+        None, "Largest allowed speed of any tool tip in the world; it is only reported when absent."
     )
-    stop: StopEntry | None = Field(
-        default=None,
-        description="Demands on the time after one robot stopped, while robots of other controllers go on; only "
-        "reported when absent.",
+    stop: StopEntry | None = setting(
+        None,
+        "Demands on the time after one robot stopped, while robots of other controllers go on; only reported when "
+        "absent.",
     )
-    exclude: tuple[ExclusionEntry, ...] = Field(default=(), description="Pairs left out of the collision check.")
+    exclude: tuple[ExclusionEntry, ...] = setting((), "Pairs left out of the collision check.")
 
     @property
     def adds_accuracy(self) -> bool:

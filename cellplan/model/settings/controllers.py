@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.model.settings.acceleration import CycleTime
-from cellplan.model.settings.entry import Angle, Coordinate, Entry, Name, PoseEntry, Text, by_kind, rule
+from cellplan.model.settings.entry import Angle, Coordinate, Entry, Name, PoseEntry, Text, by_kind, rule, setting
 from cellplan.model.settings.process_statements import Distance, ProcessStatementsEntry, require_process
 from cellplan.model.settings.units import Ms, Within
 
@@ -32,27 +32,24 @@ LEVEL_LIMIT: Final = 8
 class ControllerZeroEntry(Entry):
     """Joint positions of the controller: sign * model + zero + sum of factor * controller position of another joint."""
 
-    zero_deg: dict[str, Angle] = Field(
-        default={},
-        description="By revolute joint, what the controller shows while the model reads zero; 0 when absent.",
+    zero_deg: dict[str, Angle] = setting(
+        {}, "By revolute joint, what the controller shows while the model reads zero; 0 when absent."
     )
-    zero_mm: dict[str, Coordinate] = Field(
-        default={},
-        description="By prismatic joint, what the controller shows while the model reads zero; 0 when absent.",
+    zero_mm: dict[str, Coordinate] = setting(
+        {}, "By prismatic joint, what the controller shows while the model reads zero; 0 when absent."
     )
-    sign: dict[str, Literal[1, -1]] = Field(
-        default={}, description="By joint, -1 where the controller counts the other way round; 1 when absent."
+    sign: dict[str, Literal[1, -1]] = setting(
+        {}, "By joint, -1 where the controller counts the other way round; 1 when absent."
     )
-    coupling: dict[str, dict[str, Factor]] = Field(
-        default={},
-        description="By joint, the factors of the controller positions of earlier joints of its kind that are added.",
+    coupling: dict[str, dict[str, Factor]] = setting(
+        {}, "By joint, the factors of the controller positions of earlier joints of its kind that are added."
     )
-    limits_deg: dict[str, tuple[Angle, Angle]] = Field(
-        default={},
-        description="By revolute joint, the smallest and the largest position that the controller allows of what it "
-        "shows: of a coupled joint too, whose range in the model depends on the others.",
+    limits_deg: dict[str, tuple[Angle, Angle]] = setting(
+        {},
+        "By revolute joint, the smallest and the largest position that the controller allows of what it shows: of a "
+        "coupled joint too, whose range in the model depends on the others.",
     )
-    source: Text = Field(default="not stated", description="Where this is known from.")
+    source: Text = setting("not stated", "Where this is known from.")
 
     @model_validator(mode="after")
     def _says_something(self) -> Self:
@@ -87,33 +84,29 @@ class ControllerEntry(Entry):
 
     NAMES: ClassVar[Set[str]] = frozenset({"tasks", "process", "position_levels_mm"})  # keys that no proof depends on
     kind: KindName = Field(description="Maker of the controller, or what drives the robot.")
-    tasks: dict[Identifier, Identifier] = Field(
-        default={},
+    tasks: dict[Identifier, Identifier] = setting(
+        {},
+        "By name of a task of an ABB controller, its mechanical unit: {T_ROB1: ROB_1}; only for kind abb.",
         max_length=TASK_LIMIT,
-        description="By name of a task of an ABB controller, its mechanical unit: {T_ROB1: ROB_1}; only for kind abb.",
     )
-    latency_ms: Delay | None = Field(
-        default=None, description="Time by which a robot follows what is sent to it; absent: not stated."
+    latency_ms: Delay | None = setting(None, "Time by which a robot follows what is sent to it; absent: not stated.")
+    skew_ms: Delay | None = setting(
+        None, "Largest difference between its clock and those of the other controllers; absent: not stated."
     )
-    skew_ms: Delay | None = Field(
-        default=None,
-        description="Largest difference between its clock and those of the other controllers; absent: not stated.",
+    reaction_ms: Delay | None = setting(
+        None, "Time for which its robots go on after a robot of another controller stopped; absent: not stated."
     )
-    reaction_ms: Delay | None = Field(
-        default=None,
-        description="Time for which its robots go on after a robot of another controller stopped; absent: not stated.",
+    brake_s: Annotated[float, Field(ge=0.0, le=LONGEST_BRAKE_S)] | None = setting(
+        None, "Time in which its robots then brake on their path; absent: not stated."
     )
-    brake_s: Annotated[float, Field(ge=0.0, le=LONGEST_BRAKE_S)] | None = Field(
-        default=None, description="Time in which its robots then brake on their path; absent: not stated."
+    process: ProcessStatementsEntry | None = setting(
+        None, "How its programs begin and end a process; absent: not stated."
     )
-    process: ProcessStatementsEntry | None = Field(
-        default=None, description="How its programs begin and end a process; absent: not stated."
-    )
-    position_levels_mm: tuple[Distance, ...] = Field(
-        default=(),
-        max_length=LEVEL_LIMIT,
-        description="Distances from a point within which motions with PL=1, PL=2 and so on are rounded, as set on the "
+    position_levels_mm: tuple[Distance, ...] = setting(
+        (),
+        "Distances from a point within which motions with PL=1, PL=2 and so on are rounded, as set on the "
         "controller, rising; only for kind yaskawa. Absent: not stated, and no small corner is rounded.",
+        max_length=LEVEL_LIMIT,
     )
 
     @model_validator(mode="after")
@@ -164,51 +157,42 @@ class RobotControlEntry(Entry):
         {"task", "group", "decimals", "tool_number", "base_number", "frames", "handshake", "step_register"}
     )  # keys that no proof depends on
     id: Name = Field(description="Name of its controller under controllers.")
-    task: Identifier | None = Field(
-        default=None, description="Name of its task among the tasks of the controller; only for kind abb."
+    task: Identifier | None = setting(None, "Name of its task among the tasks of the controller; only for kind abb.")
+    group: Annotated[int, Field(ge=1, le=LAST_GROUP)] | None = setting(
+        None, "Number of its motion group; only for the kinds fanuc and yaskawa."
     )
-    group: Annotated[int, Field(ge=1, le=LAST_GROUP)] | None = Field(
-        default=None, description="Number of its motion group; only for the kinds fanuc and yaskawa."
+    decimals: Annotated[int, Field(ge=0, le=MOST_DECIMALS)] | None = setting(
+        None,
+        "Decimals of a degree or millimetre (of a radian in URScript) in programs of its controller's own language: "
+        "fanuc_ls, inform, krl, rapid, urscript and val3; those of the format when absent, and in all other formats.",
     )
-    decimals: Annotated[int, Field(ge=0, le=MOST_DECIMALS)] | None = Field(
-        default=None,
-        description="Decimals of a degree or millimetre (of a radian in URScript) in programs of its controller's own "
-        "language: fanuc_ls, inform, krl, rapid, urscript and val3; those of the format when absent, and in all other "
-        "formats.",
+    cycle_ms: CycleTime | None = setting(
+        None, "Cycle at which its controller takes positions; the same as controller_cycle_ms, of which one is enough."
     )
-    cycle_ms: CycleTime | None = Field(
-        default=None,
-        description="Cycle at which its controller takes positions; the same as controller_cycle_ms, of which one is "
-        "enough.",
+    tool_number: FrameNumber | None = setting(
+        None, "Number of its tool on the controller; absent: tool 0, or the tool of the cell."
     )
-    tool_number: FrameNumber | None = Field(
-        default=None, description="Number of its tool on the controller; absent: tool 0, or the tool of the cell."
+    base_number: FrameNumber | None = setting(
+        None, "Number of its base frame on the controller; absent: the base of the robot."
     )
-    base_number: FrameNumber | None = Field(
-        default=None, description="Number of its base frame on the controller; absent: the base of the robot."
-    )
-    frames: tuple[PartFrameNumber, ...] = Field(
-        default=(),
+    frames: tuple[PartFrameNumber, ...] = setting(
+        (),
+        "Numbers of the frames of the part on the controller, one for each pose of the part in which the robot works, "
+        "in the order of first use; not stated when absent.",
         max_length=FRAME_LIMIT,
-        description="Numbers of the frames of the part on the controller, one for each pose of the part in which the "
-        "robot works, in the order of first use; not stated when absent.",
     )
-    base: PoseEntry | None = Field(
-        default=None,
-        description="Base that its controller counts from, in the base of the model; {}: the same. Absent: not stated.",
+    base: PoseEntry | None = setting(
+        None, "Base that its controller counts from, in the base of the model; {}: the same. Absent: not stated."
     )
-    tool_frame: PoseEntry | None = Field(
-        default=None,
-        description="Flange that its controller counts tools from, in the flange of the model; {}: the same. Absent: "
-        "not stated.",
+    tool_frame: PoseEntry | None = setting(
+        None,
+        "Flange that its controller counts tools from, in the flange of the model; {}: the same. Absent: not stated.",
     )
-    handshake: HandshakeEntry | None = Field(
-        default=None, description="Signals with which it waits for other robots; none when absent."
-    )
-    step_register: Signal | None = Field(
-        default=None,
-        description="Variable, or number of the register, in which its program keeps the step that an escape program "
-        "begins from; cell_step, or register 24 of kind ur, when absent.",
+    handshake: HandshakeEntry | None = setting(None, "Signals with which it waits for other robots; none when absent.")
+    step_register: Signal | None = setting(
+        None,
+        "Variable, or number of the register, in which its program keeps the step that an escape program begins from; "
+        "cell_step, or register 24 of kind ur, when absent.",
     )
 
     @model_validator(mode="before")

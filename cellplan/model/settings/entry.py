@@ -1,6 +1,6 @@
 """Building blocks of all files: strict entries, numbers with bounds, poses, directions and choices."""
 
-from typing import Annotated, Any, ClassVar, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -41,7 +41,15 @@ Angles = tuple[FrameAngle, FrameAngle, FrameAngle]
 ORIGIN: Final = (Mm(0.0), Mm(0.0), Mm(0.0))
 NOT_TURNED: Final = (Deg(0.0), Deg(0.0), Deg(0.0))
 
+Default = TypeVar("Default")
+
 SHORTEST_DIRECTION: Final = 1e-6  # [-] a shorter vector has no direction
+
+
+def setting(default: Default, description: str, **options: Any) -> Default:
+    """A key that may be left out: what then holds, and what the key means."""
+    value: Default = Field(default=default, description=description, **options)
+    return value
 
 
 def rule(text: str, key: str = "") -> PydanticCustomError:
@@ -148,10 +156,9 @@ class OneOf(Entry):
 class PoseEntry(Entry):
     """A pose: where a frame stands and how it is turned."""
 
-    xyz_mm: Coordinates = Field(default=ORIGIN, description="Position.")
-    rpy_deg: Angles = Field(
-        default=NOT_TURNED,
-        description="Roll, pitch and yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF.",
+    xyz_mm: Coordinates = setting(ORIGIN, "Position.")
+    rpy_deg: Angles = setting(
+        NOT_TURNED, "Roll, pitch and yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF."
     )
 
     @property

@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, Tag, WithJsonSchema, model_validator
 
-from cellplan.model.settings.entry import Coordinate, Entry, Name, OneOf, PoseEntry, Size, Text, by_kind, rule
+from cellplan.model.settings.entry import Coordinate, Entry, Name, OneOf, PoseEntry, Size, Text, by_kind, rule, setting
 from cellplan.model.settings.units import Deg, Mm, Within
 
 ITEM_LIMIT: Final = 1000
@@ -40,7 +40,7 @@ class MirroredEntry(Entry):
 
     bases: tuple[Text, Text] = Field(description="Two addresses ROBOT.base.")
     plane: Literal["xz", "yz"] = Field(description="Plane of the mirror, upright in the world.")
-    at_mm: Coordinate = Field(default=Mm(0.0), description="Where the plane stands: its y (xz) or its x (yz).")
+    at_mm: Coordinate = setting(Mm(0.0), "Where the plane stands: its y (xz) or its x (yz).")
 
     @model_validator(mode="after")
     def _are_two(self) -> Self:
@@ -71,9 +71,9 @@ class KeepOutEntry(OneOf):
 
     alternatives: ClassVar[tuple[str, ...]] = ("box", "cylinder")
 
-    box: KeepOutBoxEntry | None = Field(default=None, description="Rectangle, centred on its pose.")
-    cylinder: KeepOutCylinderEntry | None = Field(default=None, description="Circle, centred on its pose.")
-    at: PoseEntry = Field(default=PoseEntry(), description="Pose in the world: x, y and yaw count.")
+    box: KeepOutBoxEntry | None = setting(None, "Rectangle, centred on its pose.")
+    cylinder: KeepOutCylinderEntry | None = setting(None, "Circle, centred on its pose.")
+    at: PoseEntry = setting(PoseEntry(), "Pose in the world: x, y and yaw count.")
 
     @model_validator(mode="after")
     def _stands_upright(self) -> Self:
@@ -87,8 +87,8 @@ class KeepOutEntry(OneOf):
 class FloorEntry(Entry):
     """Where the bases of all robots that may move must stay."""
 
-    x_mm: tuple[Coordinate, Coordinate] | None = Field(default=None, description="Lowest and highest x.")
-    y_mm: tuple[Coordinate, Coordinate] | None = Field(default=None, description="Lowest and highest y.")
+    x_mm: tuple[Coordinate, Coordinate] | None = setting(None, "Lowest and highest x.")
+    y_mm: tuple[Coordinate, Coordinate] | None = setting(None, "Lowest and highest y.")
 
     @model_validator(mode="after")
     def _is_ordered(self) -> Self:
@@ -112,50 +112,48 @@ class MisplacementEntry(Entry):
 class LayoutEntry(Entry):
     """What a layout search may change; addresses are those of the file, `robots.` may be left out."""
 
-    vary: dict[str, VaryChoice] | None = Field(
-        default=None,
-        max_length=ITEM_LIMIT,
-        description="Variables by address. ROBOT.base: {x_mm: [low, high], y_mm, z_mm, roll_deg, pitch_deg, yaw_deg}; "
-        "ROBOT.start_deg: true or one range per joint (ROBOT.start by key where joints slide); ROBOT.tool: {length_mm, "
-        "tilt_deg, roll_deg} of a tool with rod; ROBOT.weights: true or [low, high]; ROBOT.path: true or "
+    vary: dict[str, VaryChoice] | None = setting(
+        None,
+        "Variables by address. ROBOT.base: {x_mm: [low, high], y_mm, z_mm, roll_deg, pitch_deg, yaw_deg}; "
+        "ROBOT.start_deg: true or one range per joint (ROBOT.start by key where joints slide); ROBOT.tool: "
+        "{length_mm, tilt_deg, roll_deg} of a tool with rod; ROBOT.weights: true or [low, high]; ROBOT.path: true or "
         "{coefficients: 14, degree: 5}; ROBOT.branch: true; tasks.TASK.spin_deg: true or [low, high]; "
         "tasks.TASK.robot: [ROBOT, …]; part.held_by[0].at, part.at: ranges as of a base; motion.mode: [MODE, …]. When "
         "absent: the bases of all operators (x and y within 1 m, and from beyond 2.5 m on to 0.5 m from the first "
-        "holder or the part at rest; z between 0 and 600 mm unless they stand on a floor; any yaw), that of the "
-        "first holder likewise where program has attach or detach, and its start posture.",
-    )
-    fixed: tuple[Text, ...] = Field(
-        default=(), max_length=ITEM_LIMIT, description="Addresses that stay as they are, whatever vary says."
-    )
-    equal: tuple[tuple[Text, ...], ...] = Field(
-        default=(), max_length=ITEM_LIMIT, description="Lists of addresses of variables that have one value."
-    )
-    mirrored: tuple[MirroredEntry, ...] = Field(
-        default=(), max_length=ITEM_LIMIT, description="Pairs of bases that are placed symmetrically."
-    )
-    keep_out: dict[Name, KeepOutEntry] = Field(
-        default={}, max_length=ITEM_LIMIT, description="Areas in which no base and no pedestal of a varied base stands."
-    )
-    floor: FloorEntry | None = Field(default=None, description="Where the origins of all varied bases must stay.")
-    margin_deg: Annotated[Deg, Within(ge=0.0, le=180.0)] = Field(
-        default=Deg(0.0), description="Distance from its limits that every turning joint is to keep."
-    )
-    margin_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = Field(
-        default=Mm(0.0), description="Distance from its limits that every sliding joint is to keep."
-    )
-    singular_share: Annotated[float, Field(ge=0.0, le=1.0)] | None = Field(
-        default=None,
-        description="Least singular value of the Jacobian of every arm at its tool tip, in m and rad, that is to be "
-        "kept, as a share of the median over all its configurations; 0 for none. When absent: 0.1 as far as the job "
-        "allows it, where the shortest cycle is sought.",
-    )
-    misplacement: MisplacementEntry | None = Field(
-        default=None,
-        description="All demands are to be kept, and the cycle to be reached, with every base off by so much and the "
-        "motion planned anew.",
-    )
-    cost: dict[str, Annotated[float, Field(ge=0.0, le=1e6)]] = Field(
-        default={},
+        "holder or the part at rest; z between 0 and 600 mm unless they stand on a floor; any yaw), that of the first "
+        "holder likewise where program has attach or detach, and its start posture.",
         max_length=ITEM_LIMIT,
-        description="Cost by address of a change by 100 mm or 10 deg, or of a weight by a factor of 10; else 1.",
+    )
+    fixed: tuple[Text, ...] = setting((), "Addresses that stay as they are, whatever vary says.", max_length=ITEM_LIMIT)
+    equal: tuple[tuple[Text, ...], ...] = setting(
+        (), "Lists of addresses of variables that have one value.", max_length=ITEM_LIMIT
+    )
+    mirrored: tuple[MirroredEntry, ...] = setting(
+        (), "Pairs of bases that are placed symmetrically.", max_length=ITEM_LIMIT
+    )
+    keep_out: dict[Name, KeepOutEntry] = setting(
+        {}, "Areas in which no base and no pedestal of a varied base stands.", max_length=ITEM_LIMIT
+    )
+    floor: FloorEntry | None = setting(None, "Where the origins of all varied bases must stay.")
+    margin_deg: Annotated[Deg, Within(ge=0.0, le=180.0)] = setting(
+        Deg(0.0), "Distance from its limits that every turning joint is to keep."
+    )
+    margin_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = setting(
+        Mm(0.0), "Distance from its limits that every sliding joint is to keep."
+    )
+    singular_share: Annotated[float, Field(ge=0.0, le=1.0)] | None = setting(
+        None,
+        "Least singular value of the Jacobian of every arm at its tool tip, in m and rad, that is to be kept, as a "
+        "share of the median over all its configurations; 0 for none. When absent: 0.1 as far as the job allows it, "
+        "where the shortest cycle is sought.",
+    )
+    misplacement: MisplacementEntry | None = setting(
+        None,
+        "All demands are to be kept, and the cycle to be reached, with every base off by so much and the motion "
+        "planned anew.",
+    )
+    cost: dict[str, Annotated[float, Field(ge=0.0, le=1e6)]] = setting(
+        {},
+        "Cost by address of a change by 100 mm or 10 deg, or of a weight by a factor of 10; else 1.",
+        max_length=ITEM_LIMIT,
     )

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cellplan.model.settings.entry import Entry, Name, Text
+from cellplan.model.settings.entry import Entry, Name, Text, setting
 from cellplan.model.settings.task import LONGEST_S
 
 
@@ -13,6 +13,4 @@ class LockedJointEntry(Entry):
 
     robot: Name = Field(description="Robot of the joint.")
     joint: Text = Field(description="Joint that is locked.")
-    from_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
-        default=0.0, description="Time from which on it is locked."
-    )
+    from_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = setting(0.0, "Time from which on it is locked.")

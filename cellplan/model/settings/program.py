@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Final, Self
 from pydantic import Field, Tag, model_validator
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.settings.entry import Entry, Name, PoseEntry, SlidingSpeed, by_kind, rule
+from cellplan.model.settings.entry import Entry, Name, PoseEntry, SlidingSpeed, by_kind, rule, setting
 from cellplan.model.settings.task import FARTHEST_STAND_OFF_MM, LONGEST_S, MOST_CYCLES
 from cellplan.model.settings.units import Mm, Within
 
@@ -20,8 +20,8 @@ class MarkEntry(Entry):
     """A point at which robots wait for one another."""
 
     name: Name = Field(description="Name of the mark, unlike that of any task.")
-    dwell_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
-        default=0.0, description="Time for which all robots of the cell stand still at the mark."
+    dwell_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = setting(
+        0.0, "Time for which all robots of the cell stand still at the mark."
     )
 
 
@@ -44,31 +44,29 @@ class PartPlaceEntry(Entry):
     """A place at which the part lies without a robot that holds it."""
 
     at: PoseEntry = Field(description="Pose of the part frame in the world.")
-    rests_on: Supports | None = Field(
-        default=None,
-        description="Body of the environment, or list of bodies, that the part rests on: it touches each of them.",
+    rests_on: Supports | None = setting(
+        None, "Body of the environment, or list of bodies, that the part rests on: it touches each of them."
     )
-    rest_gap_mm: Annotated[Mm, Within(ge=0.0, le=WIDEST_REST_MM)] = Field(
-        default=Mm(1.0), description="Largest distance of the part from each body that it rests on."
+    rest_gap_mm: Annotated[Mm, Within(ge=0.0, le=WIDEST_REST_MM)] = setting(
+        Mm(1.0), "Largest distance of the part from each body that it rests on."
     )
-    clamped: bool = Field(
-        default=False,
-        description="Whether a nest, magnet or hook holds the part there: it need not touch what it rests on, or name "
-        "anything.",
+    clamped: bool = setting(
+        False,
+        "Whether a nest, magnet or hook holds the part there: it need not touch what it rests on, or name anything.",
     )
-    contact_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)] | None = Field(
-        default=None,
-        description="Length of the end of the approach in which what grips may touch the part, and of the beginning of "
-        "the lift in which the part may touch what it rests on; likewise when it is put down. The depth of the grip "
-        "when absent.",
+    contact_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)] | None = setting(
+        None,
+        "Length of the end of the approach in which what grips may touch the part, and of the beginning of the lift "
+        "in which the part may touch what it rests on; likewise when it is put down. The depth of the grip when "
+        "absent.",
     )
-    approach_mm: StraightMove = Field(
-        default=Mm(50.0),
-        description="Length of the straight move of the holder to the part before it grips, or away from it after it "
-        "lets go, along its tool axis.",
+    approach_mm: StraightMove = setting(
+        Mm(50.0),
+        "Length of the straight move of the holder to the part before it grips, or away from it after it lets go, "
+        "along its tool axis.",
     )
-    lift_mm: StraightMove = Field(
-        default=Mm(50.0), description="Height over which the part is moved straight up from its place, or down to it."
+    lift_mm: StraightMove = setting(
+        Mm(50.0), "Height over which the part is moved straight up from its place, or down to it."
     )
 
     @property
@@ -85,15 +83,15 @@ class PartPlaceEntry(Entry):
 class TransferEntry(Entry):
     """How fast transfer moves are at most."""
 
-    speed_percent: Annotated[float, Field(ge=LEAST_PERCENT, le=100.0)] = Field(
-        default=100.0,
-        description="Speed of transfer moves in percent of what the joints can do, as if time ran slower: it scales "
-        "accelerations by its square, jerks by its cube.",
+    speed_percent: Annotated[float, Field(ge=LEAST_PERCENT, le=100.0)] = setting(
+        100.0,
+        "Speed of transfer moves in percent of what the joints can do, as if time ran slower: it scales accelerations "
+        "by its square, jerks by its cube.",
     )
-    tcp_mm_s: SlidingSpeed | None = Field(
-        default=None,
-        description="Largest speed in the world of any tool tip, any flange and any point of a part that is held, in "
-        "transfer moves.",
+    tcp_mm_s: SlidingSpeed | None = setting(
+        None,
+        "Largest speed in the world of any tool tip, any flange and any point of a part that is held, in transfer "
+        "moves.",
     )
 
     @property
@@ -131,50 +129,42 @@ class ProgramEntry(Entry):
 
     is_home_to_home: ClassVar[bool] = True
 
-    cycles: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
-        default=1, description="How often all of the program is done."
-    )
-    marks: tuple[MarkChoice, ...] = Field(
-        default=(),
+    cycles: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = setting(1, "How often all of the program is done.")
+    marks: tuple[MarkChoice, ...] = setting(
+        (),
+        "Points at which robots wait for one another. A mark stands in the order of every robot that takes part: "
+        "these go on when all of them have come to it. A robot without the mark in its order does not take part.",
         max_length=MARK_LIMIT,
-        description="Points at which robots wait for one another. A mark stands in the order of every robot that takes "
-        "part: these go on when all of them have come to it. A robot without the mark in its order does not take part.",
     )
-    attach: PartPlaceEntry | None = Field(
-        default=None,
-        description="Where the part lies as an obstacle until it is gripped; held from the beginning when absent.",
+    attach: PartPlaceEntry | None = setting(
+        None, "Where the part lies as an obstacle until it is gripped; held from the beginning when absent."
     )
-    detach: PartPlaceEntry | None = Field(
-        default=None, description="Where the part is put down after the last task; held to the end when absent."
+    detach: PartPlaceEntry | None = setting(
+        None, "Where the part is put down after the last task; held to the end when absent."
     )
 
-    transfer: TransferEntry = Field(default=TransferEntry(), description="How fast transfer moves are at most.")
-    same_robot: TaskGroups = Field(
-        default=(), description="Tasks that one robot does: a list of them, or several such lists."
+    transfer: TransferEntry = setting(TransferEntry(), "How fast transfer moves are at most.")
+    same_robot: TaskGroups = setting((), "Tasks that one robot does: a list of them, or several such lists.")
+    together: TaskGroups = setting(
+        (),
+        "Tasks whose tools begin their paths at the same time, both sides of a web at once for example: a list of "
+        "them, or several such lists.",
     )
-    together: TaskGroups = Field(
-        default=(),
-        description="Tasks whose tools begin their paths at the same time, both sides of a web at once for example: a "
-        "list of them, or several such lists.",
+    order: OrderEntry | None = setting(None, "Tasks that take turns; any order when absent.")
+    tacks_first: bool = setting(False, "Whether all tasks with tack: true are done before any other task begins.")
+    rest_s: Annotated[float, Field(gt=0.0, le=LONGEST_S)] | None = setting(
+        None,
+        "Time for which the part cools between the end of a path and the begin of another one that is a pass of the "
+        "same seam, which lies within 10 mm of it all along, or comes nearer to it than apart_mm. Tasks that begin "
+        "together need no rest between each other.",
     )
-    order: OrderEntry | None = Field(default=None, description="Tasks that take turns; any order when absent.")
-    tacks_first: bool = Field(
-        default=False, description="Whether all tasks with tack: true are done before any other task begins."
+    apart_mm: Annotated[Mm, Within(gt=0.0, le=FARTHEST_STAND_OFF_MM)] | None = setting(
+        None, "Distance of two paths below which rest_s holds between them; passes only when absent."
     )
-    rest_s: Annotated[float, Field(gt=0.0, le=LONGEST_S)] | None = Field(
-        default=None,
-        description="Time for which the part cools between the end of a path and the begin of another one that is a "
-        "pass of the same seam, which lies within 10 mm of it all along, or comes nearer to it than apart_mm. Tasks "
-        "that begin together need no rest between each other.",
-    )
-    apart_mm: Annotated[Mm, Within(gt=0.0, le=FARTHEST_STAND_OFF_MM)] | None = Field(
-        default=None,
-        description="Distance of two paths below which rest_s holds between them; passes only when absent.",
-    )
-    arcs_apart_mm: Annotated[Mm, Within(gt=0.0, le=FARTHEST_STAND_OFF_MM)] | None = Field(
-        default=None,
-        description="Least distance of the tips of two tools that are on their paths at the same time, so that arcs do "
-        "not disturb each other; any when absent.",
+    arcs_apart_mm: Annotated[Mm, Within(gt=0.0, le=FARTHEST_STAND_OFF_MM)] | None = setting(
+        None,
+        "Least distance of the tips of two tools that are on their paths at the same time, so that arcs do not "
+        "disturb each other; any when absent.",
     )
 
     @model_validator(mode="after")

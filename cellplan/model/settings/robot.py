@@ -4,7 +4,7 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
-from cellplan.model.settings.entry import Entry, Size, Text
+from cellplan.model.settings.entry import Entry, Size, Text, setting
 from cellplan.model.settings.units import Mm, Within
 
 HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
@@ -20,28 +20,24 @@ class BodyAccuracyEntry(Entry):
     """How good the link bodies of a robot are, in place of what its own file says."""
 
     accuracy_mm: Accuracy = Field(description="Largest distance by which the real arm sticks out of its link bodies.")
-    source: Text = Field(default="stated in the cell", description="Where the figure comes from.")
+    source: Text = setting("stated in the cell", "Where the figure comes from.")
 
 
 class AxisLimitEntry(Entry):
     """What the load may do to one axis of the wrist."""
 
-    moment_nm: LoadFigure | None = Field(default=None, description="Largest moment of the load about the axis.")
-    inertia_kg_m2: LoadFigure | None = Field(
-        default=None, description="Largest moment of inertia of the load about the axis."
-    )
+    moment_nm: LoadFigure | None = setting(None, "Largest moment of the load about the axis.")
+    inertia_kg_m2: LoadFigure | None = setting(None, "Largest moment of inertia of the load about the axis.")
 
 
 class PayloadEntry(Entry):
     """What a robot may carry on its flange, as far as it is published."""
 
     mass_kg: LoadFigure = Field(description="Largest mass of tool and part.")
-    along_mm: Size | None = Field(
-        default=None, description="Farthest centre of the load from the flange plane, along the flange's z."
-    )
-    across_mm: Size | None = Field(default=None, description="Farthest centre of the load from the flange's z axis.")
-    axes: dict[str, AxisLimitEntry] = Field(default={}, description="Limits of axes of the wrist by joint name.")
-    source: Text = Field(default="not stated", description="Where the figures come from.")
+    along_mm: Size | None = setting(None, "Farthest centre of the load from the flange plane, along the flange's z.")
+    across_mm: Size | None = setting(None, "Farthest centre of the load from the flange's z axis.")
+    axes: dict[str, AxisLimitEntry] = setting({}, "Limits of axes of the wrist by joint name.")
+    source: Text = setting("not stated", "Where the figures come from.")
 
     @property
     def is_mass_only(self) -> bool:
@@ -53,8 +49,7 @@ class ReachEntry(Entry):
     """The maker's figure of the reach, from the first axis."""
 
     distance_mm: Size = Field(description="Largest distance from the first axis.")
-    to: Text | None = Field(
-        default=None,
-        description="The word flange, or the joint to whose point the maker measures; absent when it is not published.",
+    to: Text | None = setting(
+        None, "The word flange, or the joint to whose point the maker measures; absent when it is not published."
     )
-    source: Text = Field(default="not stated", description="Where the figure comes from.")
+    source: Text = setting("not stated", "Where the figure comes from.")

@@ -4,7 +4,7 @@ from typing import Annotated, Final, Self
 
 from pydantic import Field, model_validator
 
-from cellplan.model.settings.entry import Entry, SlidingSpeed, rule
+from cellplan.model.settings.entry import Entry, SlidingSpeed, rule, setting
 from cellplan.model.settings.units import Deg, Mm, Within
 
 FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
@@ -15,19 +15,15 @@ MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 class ToleranceEntry(Entry):
     """Largest allowed tool error on the part."""
 
-    position_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] = Field(
-        default=Mm(0.1), description="Largest position error."
+    position_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] = setting(Mm(0.1), "Largest position error.")
+    orientation_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] = setting(Deg(0.01), "Largest orientation error.")
+    between_rows_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] | None = setting(
+        None,
+        "Largest position error between the rows of the tables, where joints move evenly from row to row; position_mm "
+        "when left out. A larger one is for steps that something else prescribes.",
     )
-    orientation_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] = Field(
-        default=Deg(0.01), description="Largest orientation error."
-    )
-    between_rows_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] | None = Field(
-        default=None,
-        description="Largest position error between the rows of the tables, where joints move evenly from row to row; "
-        "position_mm when left out. A larger one is for steps that something else prescribes.",
-    )
-    between_rows_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] | None = Field(
-        default=None, description="Likewise for the orientation; orientation_deg when left out."
+    between_rows_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] | None = setting(
+        None, "Likewise for the orientation; orientation_deg when left out."
     )
 
     @property
@@ -58,14 +54,14 @@ Range = tuple[Annotated[Deg, Within(ge=-180.0, le=180.0)], Annotated[Deg, Within
 class WeldPositionEntry(Entry):
     """How a weld lies to gravity, by the angles of ISO 6947."""
 
-    slope_deg: Range = Field(
-        default=(Deg(-90.0), Deg(90.0)),
-        description="Smallest and largest angle of the weld axis, along the direction of travel, above the horizontal.",
+    slope_deg: Range = setting(
+        (Deg(-90.0), Deg(90.0)),
+        "Smallest and largest angle of the weld axis, along the direction of travel, above the horizontal.",
     )
-    rotation_deg: Range = Field(
-        default=(Deg(-180.0), Deg(180.0)),
-        description="Smallest and largest angle by which the weld face is turned about that axis from where it looks "
-        "up. The face looks against the tool.",
+    rotation_deg: Range = setting(
+        (Deg(-180.0), Deg(180.0)),
+        "Smallest and largest angle by which the weld face is turned about that axis from where it looks up. The face "
+        "looks against the tool.",
     )
 
     @model_validator(mode="after")
@@ -93,19 +89,19 @@ class ProcessEntry(Entry):
     feed_mm_s: SlidingSpeed = Field(
         description="Demanded speed of the tool along its path on the surface, but for the ramps beside each stop."
     )
-    tolerance_percent: Annotated[float, Field(gt=0.0, le=50.0)] = Field(
-        default=5.0, description="By how much the speed between two rows may differ from the feed."
+    tolerance_percent: Annotated[float, Field(gt=0.0, le=50.0)] = setting(
+        5.0, "By how much the speed between two rows may differ from the feed."
     )
-    on_delay_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
-        default=0.0, description="Time for which the tool rests at the start of its path with the process on."
+    on_delay_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = setting(
+        0.0, "Time for which the tool rests at the start of its path with the process on."
     )
-    off_delay_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
-        default=0.0, description="Time for which the tool rests at the end of its path with the process on."
+    off_delay_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = setting(
+        0.0, "Time for which the tool rests at the end of its path with the process on."
     )
-    ramp_s: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
-        default=0.1,
-        description="Time in which the tool comes from rest to the feed and back, at both ends of the path and at "
-        "corners at which it stops; the process is on, the feed is not judged.",
+    ramp_s: Annotated[float, Field(gt=0.0, le=10.0)] = setting(
+        0.1,
+        "Time in which the tool comes from rest to the feed and back, at both ends of the path and at corners at "
+        "which it stops; the process is on, the feed is not judged.",
     )
 
     @property
