@@ -188,14 +188,10 @@ def _check(cell: Cell, run: RunRehearsal, place: int, kind: int) -> Check:
     limit = scale * (task.tolerance.position_mm.si, task.tolerance.orientation_deg.si)[kind]
     after = " after correction" if run.trials[0].correction is not None else ""
     which = f" in trial {trial + 1} of {len(errors)}" if len(errors) > 1 else ""
+    message = (
+        f"true {name} error of task '{task.name}'{after}: {value:.3g} {unit} at {at_s:.3f} s{which}, "
+        f"allowed {limit:g} {unit}"
+    )
     return Check(
-        name=f"true_{name}_error",
-        subject=task.name,
-        passed=value <= limit,
-        value=value,
-        limit=limit,
-        unit=unit,
-        at_s=at_s,
-        message=f"true {name} error of task '{task.name}'{after}: {value:.3g} {unit} at {at_s:.3f} s{which}, "
-        f"allowed {limit:g} {unit}",
+        f"true_{name}_error", task.name, value <= limit, message, value=value, limit=limit, unit=unit, at_s=at_s
     )

@@ -131,14 +131,6 @@ def _check(
     last = arcs[-1]
     value, limit, unit = measured
     subject = ", ".join(arc.task for arc in arcs)
-    check = Check(
-        name=name,
-        subject=subject,
-        passed=passed,
-        value=value,
-        limit=limit,
-        unit=unit,
-        at_s=last.begin - last.origin,
-        message=f"tasks {subject}: {words}",
-    )
+    message = f"tasks {subject}: {words}"
+    check = Check(name, subject, passed, message, value=value, limit=limit, unit=unit, at_s=last.begin - last.origin)
     return last.place, check

@@ -115,16 +115,8 @@ def _check_together(scene: Scene, progress: Progress) -> CellCheck:
     pair = _touching_at_start(scene, start)
     searched = tuple(robot.name for robot in cell.robots if robot.start is None)
     words = "no collision at the start" if pair is None else f"'{pair[0]}' touches '{pair[1]}' at the start"
-    at_start = Check(
-        name="start_collision",
-        subject="cell" if pair is None else f"{pair[0]} - {pair[1]}",
-        passed=pair is None,
-        value=0.0 if pair is None else 1.0,
-        limit=0.0,
-        unit="pairs",
-        at_s=0.0,
-        message=words,
-    )
+    bodies, value = ("cell", 0.0) if pair is None else (f"{pair[0]} - {pair[1]}", 1.0)
+    at_start = Check("start_collision", bodies, pair is None, words, value=value, limit=0.0, unit="pairs", at_s=0.0)
     loads = check_payload_at_rest(cell, scene.chains, start)
     return CellCheck(
         cell=started,
@@ -149,15 +141,9 @@ def _on_trial(choice: StartChoice) -> Iterator[Check]:
     if choice.trial is None or choice.words is None:
         return
     is_sound = choice.trial.is_sound
+    message = choice.words if is_sound else f"{choice.words}; cellplan solve decides, on the accurate clock"
     yield Check(
-        name="start_trial",
-        subject="cell",
-        passed=is_sound,
-        value=0.0 if is_sound else 1.0,
-        limit=0.0,
-        unit="faults",
-        at_s=None,
-        message=choice.words if is_sound else f"{choice.words}; cellplan solve decides, on the accurate clock",
+        "start_trial", "cell", is_sound, message, value=0.0 if is_sound else 1.0, limit=0.0, unit="faults", at_s=None
     )
 
 

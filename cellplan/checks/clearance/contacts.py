@@ -76,17 +76,11 @@ def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, minimum: C
     passed = bool(distance >= demand)
     shown = rounded_down(MM * distance) if passed else np.floor(10.0 * MM * distance) / 10.0  # never as enough
     least = "" if is_exact else "at least "
-    return Check(
-        name="clearance",
-        subject=str(kind),
-        passed=passed,
-        value=MM * distance,
-        limit=MM * demand,
-        unit="mm",
-        at_s=at_s,
-        message=f"clearance {kind}: {names[0]} to {names[1]} {least}{shown:.1f} mm at {at_s:.3f} s, "
-        f"required {MM * demand:.1f} mm{reason}",
+    message = (
+        f"clearance {kind}: {names[0]} to {names[1]} {least}{shown:.1f} mm at {at_s:.3f} s, "
+        f"required {MM * demand:.1f} mm{reason}"
     )
+    return Check("clearance", str(kind), passed, message, value=MM * distance, limit=MM * demand, unit="mm", at_s=at_s)
 
 
 def _of_pairs(names: tuple[str, str], reason: str, times: Array, pairs: Sequence[PairBound]) -> list[Contact]:
@@ -157,28 +151,13 @@ def _not_certified(bound: Bound, times: Array, pair: PairBound) -> Check:
     what = f"{np.floor(10.0 * proved) / 10.0:.1f} mm is proved, required {required:.1f} mm"
     if not proved > 0.0:
         what = "no contact was found, but none could be ruled out"
-    return Check(
-        name="clearance",
-        subject=f"{first} - {second}",
-        passed=False,
-        value=proved,
-        limit=required,
-        unit="mm",
-        at_s=at_s,
-        message=f"not certified: {first} to {second} at {at_s:.3f} s{more}: {what}{smallest}; keep them farther apart "
-        "or shorten motion.step_s",
+    message = (
+        f"not certified: {first} to {second} at {at_s:.3f} s{more}: {what}{smallest}; keep them farther apart "
+        "or shorten motion.step_s"
     )
+    return Check("clearance", f"{first} - {second}", False, message, value=proved, limit=required, unit="mm", at_s=at_s)
 
 
 def _collision(subject: str, *, passed: bool, length_s: float, at_s: float | None, message: str) -> Check:
     """A check on contact; its value is the time spent in contact."""
-    return Check(
-        name="collision",
-        subject=subject,
-        passed=passed,
-        value=length_s,
-        limit=0.0,
-        unit="s",
-        at_s=at_s,
-        message=message,
-    )
+    return Check("collision", subject, passed, message, value=length_s, limit=0.0, unit="s", at_s=at_s)

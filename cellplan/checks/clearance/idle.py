@@ -32,13 +32,5 @@ def _stands(robot: Robot, times: Array, q: Array) -> Check:
     unit, passed = joint.display_unit.name, value <= HOME_TOL
     outcome = f"stays at its home, at most {value:.2g} {unit} from it" if passed else ""
     far = f"joint {joint.name} is {value:.6g} {unit} from its home at {times[row]:.3f} s, although the robot is idle"
-    return Check(
-        name="home",
-        subject=robot.name,
-        passed=passed,
-        value=value,
-        limit=HOME_TOL,
-        unit=unit,
-        at_s=float(times[row]),
-        message=f"idle robot {robot.name}: {outcome or far}",
-    )
+    message = f"idle robot {robot.name}: {outcome or far}"
+    return Check("home", robot.name, passed, message, value=value, limit=HOME_TOL, unit=unit, at_s=float(times[row]))

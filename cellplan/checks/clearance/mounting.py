@@ -61,16 +61,9 @@ def _check(scene: Scene, mounted: PairDepth, times: Array | None) -> Check:
         held = f"is {_shown(depth)} mm deep in {outer}{instant}" if depth > 0.0 else f"does not reach into {outer}"
         message = f"{inner} {held}, allowed {limit:g} mm{share}"
     passed, cure = _passed(mounted), PIT_CURE if is_ground(scene.bodies[pair.second]) else CURES[pair.mount]
-    return Check(
-        name=str(pair.mount),
-        subject=f"{inner} - {outer}",
-        passed=passed,
-        value=-gap if gap > 0.0 else depth,
-        limit=limit,
-        unit="mm",
-        at_s=at_s,
-        message=message if passed else f"{message}: {cure}",
-    )
+    message, value = message if passed else f"{message}: {cure}", -gap if gap > 0.0 else depth
+    bodies = f"{inner} - {outer}"
+    return Check(str(pair.mount), bodies, passed, message, value=value, limit=limit, unit="mm", at_s=at_s)
 
 
 def _gap(scene: Scene, depth: PairDepth) -> float:

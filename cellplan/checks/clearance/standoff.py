@@ -34,13 +34,6 @@ def _check(task: Task, standoff: Standoff) -> Check:
     if standoff.excused:
         names = ", ".join(f"{name} over {MM * length:.1f} mm" for name, length in standoff.excused.items())
         message += f"; excused: {names}"
-    return Check(
-        name="standoff",
-        subject=task.name,
-        passed=not standoff.is_off,
-        value=float(min(MM * judged, 1e6)),
-        limit=MM * (low if judged < low else high),
-        unit="mm",
-        at_s=standoff.at_s,
-        message=f"{message}; {cure}" if standoff.is_off else message,
-    )
+    message = f"{message}; {cure}" if standoff.is_off else message
+    value, limit, at_s = float(min(MM * judged, 1e6)), MM * (low if judged < low else high), standoff.at_s
+    return Check("standoff", task.name, not standoff.is_off, message, value=value, limit=limit, unit="mm", at_s=at_s)

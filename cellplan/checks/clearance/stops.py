@@ -105,16 +105,8 @@ def _unknown(name: str, limit: float) -> Check:
     """A failed check of a demand that cannot be judged."""
     value = np.inf if name == "stop_depth" else 0.0
     text = "not known how other robots go on: the controllers of this cell state neither reaction_ms nor brake_s"
-    return Check(
-        name=name,
-        subject="stop of one robot",
-        passed=False,
-        value=value,
-        limit=limit,
-        unit="mm",
-        at_s=None,
-        message=f"{_WORDS[name][0]} at a stop of one robot: {text}; demanded: {_WORDS[name][1]} {limit:g} mm",
-    )
+    message = f"{_WORDS[name][0]} at a stop of one robot: {text}; demanded: {_WORDS[name][1]} {limit:g} mm"
+    return Check(name, "stop of one robot", False, message, value=value, limit=limit, unit="mm", at_s=None)
 
 
 def instant_text(instant: StopInstant | None) -> str:
@@ -130,16 +122,9 @@ def _check(name: str, passed: bool, values: tuple[float, float], of: str, instan
     value, limit = values
     what, side = _WORDS[name]
     when = f" when {instant_text(instant)}" if instant is not None else ""
-    return Check(
-        name=name,
-        subject="stop of one robot",
-        passed=passed,
-        value=value,
-        limit=limit,
-        unit="mm",
-        at_s=None if instant is None else instant.at_s,
-        message=f"{what} at a stop of one robot: {value:.3g} mm ({of}){when}; demanded: {side} {limit:g} mm",
-    )
+    message = f"{what} at a stop of one robot: {value:.3g} mm ({of}){when}; demanded: {side} {limit:g} mm"
+    at_s = None if instant is None else instant.at_s
+    return Check(name, "stop of one robot", passed, message, value=value, limit=limit, unit="mm", at_s=at_s)
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,16 +24,8 @@ def _check(task: Task, tool_depth: ToolDepth) -> Check:
         f"tool depth of task '{task.name}': {depth:.3g} mm of the tool is inside the part or beyond it{when} ({what}), "
         f"allowed {limit:g} mm"
     )
-    return Check(
-        name="tool_depth",
-        subject=task.name,
-        passed=passed,
-        value=depth,
-        limit=limit,
-        unit="mm",
-        at_s=tool_depth.at_s,
-        message=message if passed else f"{message}; {', or '.join(_cures(task, tool_depth))}",
-    )
+    message = message if passed else f"{message}; {', or '.join(_cures(task, tool_depth))}"
+    return Check("tool_depth", task.name, passed, message, value=depth, limit=limit, unit="mm", at_s=tool_depth.at_s)
 
 
 def _cures(task: Task, depth: ToolDepth) -> Iterator[str]:

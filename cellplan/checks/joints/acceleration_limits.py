@@ -136,60 +136,34 @@ def _not_judged(cell: Cell) -> Iterator[NotJudged]:
 
 def _check_acceleration(cell: Cell, use: JointAcceleration, limit: float) -> Check:
     """One joint's largest acceleration; the name says when its limit is assumed."""
-    unit, scale = use.display_unit
-    is_assumed = use.source is LimitSource.ASSUMED
-    passed = use.peak <= limit
+    joint, name, (unit, scale) = f"{use.robot}/{use.joint}", "joint_acceleration", use.display_unit
+    passed, peak, most, unit = use.peak <= limit, scale * use.peak, scale * limit, f"{unit}/s2"
     verdict = "has a peak acceleration of" if passed else "exceeds its acceleration limit:"
-    against = f"limit {scale * limit:.5g} {unit}/s2"
-    if is_assumed:
-        index = cell.robot(use.robot).model.joint_names.index(use.joint)
+    against = f"limit {most:.5g} {unit}"
+    if use.source is LimitSource.ASSUMED:
+        name, index = "joint_acceleration_assumed", cell.robot(use.robot).model.joint_names.index(use.joint)
         against = f"assumed {against}: full speed in {full_speed_in(cell.robot(use.robot).acceleration, index):g} s"
     jump = "; its velocity is discontinuous" if use.is_jump and not passed else ""
-    return Check(
-        name="joint_acceleration_assumed" if is_assumed else "joint_acceleration",
-        subject=f"{use.robot}/{use.joint}",
-        passed=passed,
-        value=scale * use.peak,
-        limit=scale * limit,
-        unit=f"{unit}/s2",
-        at_s=use.peak_at_s,
-        message=(
-            f"joint {use.robot}/{use.joint} {verdict} {scale * use.peak:.4g} {unit}/s2 "
-            f"at {use.peak_at_s:.3f} s ({against}){jump}"
-        ),
-    )
+    message = f"joint {joint} {verdict} {peak:.4g} {unit} at {use.peak_at_s:.3f} s ({against}){jump}"
+    return Check(name, joint, passed, message, value=peak, limit=most, unit=unit, at_s=use.peak_at_s)
 
 
 def _check_jerk(use: JointAcceleration, limit: float) -> Check:
     """One joint's largest jerk."""
-    unit, scale = use.display_unit
-    return Check(
-        name="joint_jerk",
-        subject=f"{use.robot}/{use.joint}",
-        passed=use.peak_jerk <= limit,
-        value=scale * use.peak_jerk,
-        limit=scale * limit,
-        unit=f"{unit}/s3",
-        at_s=use.peak_jerk_at_s,
-        message=(
-            f"joint {use.robot}/{use.joint} has a peak jerk of {scale * use.peak_jerk:.4g} {unit}/s3 over "
-            f"{1e3 * use.window:g} ms at {use.peak_jerk_at_s:.3f} s, limit {scale * limit:g} {unit}/s3"
-        ),
+    joint, (unit, scale), at_s = f"{use.robot}/{use.joint}", use.display_unit, use.peak_jerk_at_s
+    peak, most, unit = scale * use.peak_jerk, scale * limit, f"{unit}/s3"
+    message = (
+        f"joint {joint} has a peak jerk of {peak:.4g} {unit} over {1e3 * use.window:g} ms at {at_s:.3f} s, "
+        f"limit {most:g} {unit}"
     )
+    return Check("joint_jerk", joint, use.peak_jerk <= limit, message, value=peak, limit=most, unit=unit, at_s=at_s)
 
 
 def _check_part(corner: PointAcceleration, limit: float) -> Check:
     """The part's largest acceleration."""
-    return Check(
-        name="part_acceleration",
-        subject="part",
-        passed=corner.peak <= limit,
-        value=corner.peak,
-        limit=limit,
-        unit="m/s2",
-        at_s=corner.peak_at_s,
-        message=(
-            f"part has a peak acceleration of {corner.peak:.4g} m/s2 (a corner of its bounding box) "
-            f"at {corner.peak_at_s:.3f} s, allowed {limit:g} m/s2"
-        ),
+    peak, at_s = corner.peak, corner.peak_at_s
+    message = (
+        f"part has a peak acceleration of {peak:.4g} m/s2 (a corner of its bounding box) at {at_s:.3f} s, "
+        f"allowed {limit:g} m/s2"
     )
+    return Check("part_acceleration", "part", peak <= limit, message, value=peak, limit=limit, unit="m/s2", at_s=at_s)

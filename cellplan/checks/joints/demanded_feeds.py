@@ -52,17 +52,12 @@ def _check_delay(task: Task, process: ProcessEntry, key: str, took: tuple[float,
     """The begin of a delay and the time that it takes in a retimed program, in [s]: at most what its rate allows."""
     delay = process.on_delay_s if key == "on_delay" else process.off_delay_s
     limit = delay / (1.0 - process.tolerance) + step
-    return Check(
-        name=f"process_{key}",
-        subject=task.name,
-        passed=took[1] <= limit + TIME_TOLERANCE,
-        value=took[1],
-        limit=limit,
-        unit="s",
-        at_s=took[0],
-        message=f"{key}_s of task '{task.name}': {took[1]:.4g} s at {took[0]:.3f} s, demanded {delay:g} s within "
-        f"{process.tolerance_percent:g} % and a step",
+    at_s, passed = took[0], took[1] <= limit + TIME_TOLERANCE
+    message = (
+        f"{key}_s of task '{task.name}': {took[1]:.4g} s at {at_s:.3f} s, demanded {delay:g} s within "
+        f"{process.tolerance_percent:g} % and a step"
     )
+    return Check(f"process_{key}", task.name, passed, message, value=took[1], limit=limit, unit="s", at_s=at_s)
 
 
 def nearest_to_limit(cell: Cell, times: Array, q: Mapping[str, Array], step: int) -> tuple[str, str, float]:
@@ -118,13 +113,5 @@ def _check(
     elif not passed:
         joint, kind, share = nearest_to_limit(cell, times, q, worst)
         message += f"; {joint} is at {PERCENT * share:.3g} % of its {kind} limit there"
-    return Check(
-        name="process_feed",
-        subject=task.name,
-        passed=passed,
-        value=PERCENT * value,
-        limit=process.tolerance_percent,
-        unit="%",
-        at_s=float(times[worst]),
-        message=message,
-    )
+    most, at_s = process.tolerance_percent, float(times[worst])
+    return Check("process_feed", task.name, passed, message, value=PERCENT * value, limit=most, unit="%", at_s=at_s)

@@ -61,18 +61,7 @@ def check_joint_drift(repeatability: Repeatability | None, *, is_demanded: bool)
         return ()
     if repeatability is None:
         message = "joint drift: there is no cycle to judge, as not all tools come back to the pose of their start"
-        return (
-            Check(
-                name="joint_drift",
-                subject="cell",
-                passed=False,
-                value=0.0,
-                limit=1.0,
-                unit="cycles",
-                at_s=None,
-                message=message,
-            ),
-        )
+        return (Check("joint_drift", "cell", False, message, value=0.0, limit=1.0, unit="cycles", at_s=None),)
     return tuple(_check(repeatability, drift) for drift in repeatability.drifts)
 
 
@@ -96,14 +85,10 @@ def _check(drifts: Repeatability, drift: JointDrift) -> Check:
     """One joint against its limit."""
     unit, scale = drift.display_unit
     value, limit = scale * drift.worst, scale * _limit(drift)
-    return Check(
-        name="joint_drift",
-        subject=f"{drift.robot} {drift.joint}",
-        passed=drift.worst <= _limit(drift),
-        value=value,
-        limit=limit,
-        unit=unit,
-        at_s=float(drifts.cycle_times[drift.at_cycle]),
-        message=f"{drift.robot} {drift.joint} is {value:.3g} {unit} away from its position one cycle earlier, "
-        f"at {drifts.cycle_times[drift.at_cycle]:.3f} s, the end of cycle {drift.at_cycle}; allowed {limit:g} {unit}",
+    joint, at_s = f"{drift.robot} {drift.joint}", float(drifts.cycle_times[drift.at_cycle])
+    message = (
+        f"{joint} is {value:.3g} {unit} away from its position one cycle earlier, at {at_s:.3f} s, the end of cycle "
+        f"{drift.at_cycle}; allowed {limit:g} {unit}"
     )
+    passed = drift.worst <= _limit(drift)
+    return Check("joint_drift", joint, passed, message, value=value, limit=limit, unit=unit, at_s=at_s)

@@ -24,7 +24,7 @@ def check_joins(cell: Cell, reports: Sequence[Report]) -> Check:
     Returns:
         One check for the whole program; its time counts from the begin of the phase that it names.
     """
-    worst = (-1.0, "", 0.0, 0.0, "")
+    worst = (-1.0, "", 0.0, 0.0, "/s2")
     for before, after in pairwise([*reports, reports[0]]):
         step = float(after.times[1] - after.times[0])
         for robot in cell.robots:
@@ -32,28 +32,16 @@ def check_joins(cell: Cell, reports: Sequence[Report]) -> Check:
             accelerations = np.abs((other[1] - other[0]) - (one[-1] - one[-2])) / step**2
             for index, joint in enumerate(robot.model.joints):
                 limit, (unit, scale) = acceleration_limit(robot, index)[0], joint.display_unit
-                if limit is not None and float(accelerations[index]) / limit > worst[0]:
+                value = float(accelerations[index])
+                if limit is not None and value / limit > worst[0]:
                     name = f"{robot.name}/{joint.name} at the begin of {after.phase}"
-                    worst = (
-                        float(accelerations[index]) / limit,
-                        name,
-                        scale * float(accelerations[index]),
-                        scale * limit,
-                        unit,
-                    )
+                    worst = value / limit, name, scale * value, scale * limit, f"{unit}/s2"
     share, name, value, allowed, unit = worst
     verdict = "keeps its acceleration limit" if share <= 1.0 else "exceeds its acceleration limit"
-    message = f"where phases meet: joint {name} {verdict}: {value:.4g} {unit}/s2, limit {allowed:.5g} {unit}/s2"
-    return Check(
-        name="joint_acceleration_between_phases",
-        subject=name,
-        passed=share <= 1.0,
-        value=value,
-        limit=allowed,
-        unit=f"{unit}/s2",
-        at_s=0.0,
-        message=message if name else "where phases meet: no joint has an acceleration limit",
-    )
+    message = f"where phases meet: joint {name} {verdict}: {value:.4g} {unit}, limit {allowed:.5g} {unit}"
+    message = message if name else "where phases meet: no joint has an acceleration limit"
+    kind = "joint_acceleration_between_phases"
+    return Check(kind, name, share <= 1.0, message, value=value, limit=allowed, unit=unit, at_s=0.0)
 
 
 def with_joins(cell: Cell, reports: Sequence[Report]) -> list[Report]:

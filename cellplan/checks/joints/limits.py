@@ -37,18 +37,11 @@ def check_sums(robot: Robot, times: Array, q: Array) -> list[Check]:
         limit = it.lower if value - it.lower < it.upper - value else it.upper
         verdict = "stays within" if passed else "leaves"
         low, high = np.degrees([it.lower, it.upper])
-        words = f"{verdict} {low:.6g} .. {high:.6g} deg, {np.degrees(value):.4f} deg at worst, at {at_s:.3f} s"
+        worst_deg, limit_deg = float(np.degrees(value)), float(np.degrees(limit))
+        words = f"{verdict} {low:.6g} .. {high:.6g} deg, {worst_deg:.4f} deg at worst, at {at_s:.3f} s"
+        subject, message = f"{robot.name}/{names}", f"sum {names} of {robot.name} {words}"
         checks.append(
-            Check(
-                name="joint_sum",
-                subject=f"{robot.name}/{names}",
-                passed=passed,
-                value=float(np.degrees(value)),
-                limit=float(np.degrees(limit)),
-                unit="deg",
-                at_s=at_s,
-                message=f"sum {names} of {robot.name} {words}",
-            )
+            Check("joint_sum", subject, passed, message, value=worst_deg, limit=limit_deg, unit="deg", at_s=at_s)
         )
     return checks
 
@@ -75,19 +68,11 @@ def check_shown(robot: Robot, times: Array, q: Array) -> list[Check]:
         limit = lower if value - lower < upper - value else upper
         passed = bool(margins[worst] >= -SHOWN_TOL)
         verdict = f"{'stays' if passed else 'is'} {scale * abs(float(margins[worst])):.4g} {unit} "
-        verdict += "inside its limits" if passed else f"beyond its limit {scale * limit:.6g} {unit}"
+        value, limit, name = scale * value, scale * limit, f"{robot.name}/{joint.name}"
+        verdict += "inside its limits" if passed else f"beyond its limit {limit:.6g} {unit}"
+        message = f"joint {name} as the controller shows it {verdict}, {value:.4f} {unit}, worst at {at_s:.3f} s"
         checks.append(
-            Check(
-                name="controller_position",
-                subject=f"{robot.name}/{joint.name}",
-                passed=passed,
-                value=scale * value,
-                limit=scale * limit,
-                unit=unit,
-                at_s=at_s,
-                message=f"joint {robot.name}/{joint.name} as the controller shows it {verdict}, {scale * value:.4f} "
-                f"{unit}, worst at {at_s:.3f} s",
-            )
+            Check("controller_position", name, passed, message, value=value, limit=limit, unit=unit, at_s=at_s)
         )
     return checks
 
@@ -110,37 +95,19 @@ def _check_position(use: JointUse, times: Array, q: Array) -> Check:
             f"is {-scale * use.margin:.4g} {unit} {side} limit {limit:g} {unit} "
             f"(reaches {value:.4f} {unit}; outside from {first:.3f} s)"
         )
-    return Check(
-        name="joint_position",
-        subject=f"{use.robot}/{use.joint}",
-        passed=passed,
-        value=value,
-        limit=limit,
-        unit=unit,
-        at_s=use.margin_at_s,
-        message=f"joint {use.robot}/{use.joint} {verdict}, worst at {use.margin_at_s:.3f} s",
-    )
+    joint, at_s = f"{use.robot}/{use.joint}", use.margin_at_s
+    message = f"joint {joint} {verdict}, worst at {at_s:.3f} s"
+    return Check("joint_position", joint, passed, message, value=value, limit=limit, unit=unit, at_s=at_s)
 
 
 def _check_velocity(use: JointUse, alike: Sequence[float]) -> Check:
     """One joint's largest speed; ``alike`` are the limits of the robot's other joints that move as it does."""
-    unit, scale = use.display_unit
-    passed = use.peak_velocity <= use.velocity_limit
+    joint, (unit, scale), at_s = f"{use.robot}/{use.joint}", use.display_unit, use.peak_velocity_at_s
+    passed, peak, limit = use.peak_velocity <= use.velocity_limit, scale * use.peak_velocity, scale * use.velocity_limit
     verdict = "has a peak velocity of" if passed else "exceeds its velocity limit:"
     doubt = "" if passed else doubt_about_velocity(use.velocity_limit, alike, is_revolute=use.is_revolute)
     doubt = doubt and f"; {doubt}"
-    percent = 100 * use.peak_velocity / use.velocity_limit
-    return Check(
-        name="joint_velocity",
-        subject=f"{use.robot}/{use.joint}",
-        passed=passed,
-        value=scale * use.peak_velocity,
-        limit=scale * use.velocity_limit,
-        unit=f"{unit}/s",
-        at_s=use.peak_velocity_at_s,
-        message=(
-            f"joint {use.robot}/{use.joint} {verdict} {scale * use.peak_velocity:.4g} {unit}/s "
-            f"at {use.peak_velocity_at_s:.3f} s ({percent:.4g} % of its limit {scale * use.velocity_limit:g} "
-            f"{unit}/s){doubt}"
-        ),
-    )
+    percent, unit = 100 * use.peak_velocity / use.velocity_limit, f"{unit}/s"
+    share = f"{percent:.4g} % of its limit {limit:g} {unit}"
+    message = f"joint {joint} {verdict} {peak:.4g} {unit} at {at_s:.3f} s ({share}){doubt}"
+    return Check("joint_velocity", joint, passed, message, value=peak, limit=limit, unit=unit, at_s=at_s)

@@ -72,13 +72,5 @@ def _check(cell: Cell, lock: LockedJointEntry, times: Array, q: Array) -> Check:
 
 def _verdict(lock: LockedJointEntry, message: str, *, value: float, unit: str, at_s: float | None) -> Check:
     """The check of one joint."""
-    return Check(
-        name="locked_joint",
-        subject=f"{lock.robot}/{lock.joint}",
-        passed=value <= STANDSTILL_TOL,
-        value=value,
-        limit=STANDSTILL_TOL,
-        unit=unit,
-        at_s=at_s,
-        message=message,
-    )
+    joint, limit = f"{lock.robot}/{lock.joint}", STANDSTILL_TOL
+    return Check("locked_joint", joint, value <= limit, message, value=value, limit=limit, unit=unit, at_s=at_s)

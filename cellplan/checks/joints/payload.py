@@ -181,16 +181,9 @@ def _mass_check(use: LoadUse, limits: PayloadEntry) -> Check:
         share = "" if use.holders < 2 else f" as its share among {use.holders} holders"
         masses.append(f"part {use.part_mass:.4g} kg{share}" if use.part_mass is not None else "part mass not stated")
     carried = f"carries {use.known_mass:.4g} kg" + (f" ({', '.join(masses)})" if masses else "")
-    return Check(
-        name="payload",
-        subject=use.robot,
-        passed=use.known_mass <= limits.mass_kg,
-        value=use.known_mass,
-        limit=limits.mass_kg,
-        unit="kg",
-        at_s=None,
-        message=f"payload {use.robot}: {carried}, allowed {limits.mass_kg:g} kg",
-    )
+    mass, limit = use.known_mass, limits.mass_kg
+    message = f"payload {use.robot}: {carried}, allowed {limit:g} kg"
+    return Check("payload", use.robot, mass <= limit, message, value=mass, limit=limit, unit="kg", at_s=None)
 
 
 def _centre_checks(use: LoadUse, limits: PayloadEntry) -> list[Check]:
@@ -201,18 +194,10 @@ def _centre_checks(use: LoadUse, limits: PayloadEntry) -> list[Check]:
         ("across", "from the flange axis", use.across, limits.across_mm),
     ):
         if limit is not None:
-            text = f"payload {use.robot}: centre of mass {MM * value:.1f} mm {origin}, allowed {limit:g} mm"
+            subject, distance, passed = f"{use.robot} {where}", MM * value, value <= limit.si
+            text = f"payload {use.robot}: centre of mass {distance:.1f} mm {origin}, allowed {limit:g} mm"
             checks.append(
-                Check(
-                    name="payload_centre",
-                    subject=f"{use.robot} {where}",
-                    passed=value <= limit.si,
-                    value=MM * value,
-                    limit=limit,
-                    unit="mm",
-                    at_s=None,
-                    message=text,
-                )
+                Check("payload_centre", subject, passed, text, value=distance, limit=limit, unit="mm", at_s=None)
             )
     return checks
 
@@ -222,37 +207,15 @@ def _axis_checks(use: LoadUse, axis: AxisUse, limit: AxisLimitEntry) -> list[Che
     subject, checks = f"{use.robot}/{axis.joint}", []
     if limit.moment_nm is not None:
         worst, at_s = max((axis.moment, axis.moment_at_s), (axis.static_moment, axis.static_at_s))
+        most, passed = limit.moment_nm, worst <= limit.moment_nm
         text = (
             f"payload {subject}: moment of the load {worst:.2f} Nm at {at_s:.3f} s "
-            f"({axis.static_moment:.2f} Nm at rest), allowed {limit.moment_nm:g} Nm"
+            f"({axis.static_moment:.2f} Nm at rest), allowed {most:g} Nm"
         )
-        checks.append(
-            Check(
-                name="payload_moment",
-                subject=subject,
-                passed=worst <= limit.moment_nm,
-                value=worst,
-                limit=limit.moment_nm,
-                unit="Nm",
-                at_s=at_s,
-                message=text,
-            )
-        )
+        checks.append(Check("payload_moment", subject, passed, text, value=worst, limit=most, unit="Nm", at_s=at_s))
     if limit.inertia_kg_m2 is not None:
-        text = (
-            f"payload {subject}: inertia of the load {axis.inertia:.4f} kg m² at {axis.inertia_at_s:.3f} s, "
-            f"allowed {limit.inertia_kg_m2:g} kg m²"
-        )
-        checks.append(
-            Check(
-                name="payload_inertia",
-                subject=subject,
-                passed=axis.inertia <= limit.inertia_kg_m2,
-                value=axis.inertia,
-                limit=limit.inertia_kg_m2,
-                unit="kg m²",
-                at_s=axis.inertia_at_s,
-                message=text,
-            )
-        )
+        worst, at_s, most, unit = axis.inertia, axis.inertia_at_s, limit.inertia_kg_m2, "kg m²"
+        text = f"payload {subject}: inertia of the load {worst:.4f} {unit} at {at_s:.3f} s, allowed {most:g} {unit}"
+        passed = worst <= most
+        checks.append(Check("payload_inertia", subject, passed, text, value=worst, limit=most, unit=unit, at_s=at_s))
     return checks

@@ -49,13 +49,6 @@ def check_transfer_speeds(
 def _check(name: str, robot: str, what: str, value: tuple[float, str], *, limit: float, at_s: float) -> Check:
     """A largest speed, with its unit, against its limit."""
     speed, unit = value
-    return Check(
-        name=name,
-        subject=robot,
-        passed=speed <= (1.0 + ROUNDING) * limit,
-        value=speed,
-        limit=limit,
-        unit=unit.partition(" ")[0],
-        at_s=at_s,
-        message=f"{what} at {speed:.4g} {unit} in a transfer move at {at_s:.3f} s, allowed {limit:g} {unit}",
-    )
+    passed, word = speed <= (1.0 + ROUNDING) * limit, unit.partition(" ")[0]
+    message = f"{what} at {speed:.4g} {unit} in a transfer move at {at_s:.3f} s, allowed {limit:g} {unit}"
+    return Check(name, robot, passed, message, value=speed, limit=limit, unit=word, at_s=at_s)

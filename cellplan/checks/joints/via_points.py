@@ -52,16 +52,8 @@ def _check(robot: Robot, report: Report, points: Sequence[ViaPoint]) -> Check:
         first = row if len(passing) else first
     passed = worst <= PASSED
     verdict = "passes its via points" if passed else f"misses a via point by {worst:.4g} rad or m"
-    return Check(
-        name="via_point",
-        subject=robot.name,
-        passed=passed,
-        value=worst,
-        limit=PASSED,
-        unit="rad or m",
-        at_s=at_s,
-        message=f"{robot.name} {verdict}{'' if passed else f', at {at_s:.3f} s'}",
-    )
+    message = f"{robot.name} {verdict}{'' if passed else f', at {at_s:.3f} s'}"
+    return Check("via_point", robot.name, passed, message, value=worst, limit=PASSED, unit="rad or m", at_s=at_s)
 
 
 def _stay(robot: str, report: Report, service: Service) -> Check:
@@ -70,13 +62,6 @@ def _stay(robot: str, report: Report, service: Service) -> Check:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(int)))
     spans = [(report.times[last - 1] - report.times[first], first) for first, last in edges.reshape(-1, 2)]
     longest, first = max(spans, key=lambda it: float(it[0]), default=(0.0, 0))
-    return Check(
-        name="service",
-        subject=robot,
-        passed=bool(longest >= service.takes - PASSED),
-        value=float(longest),
-        limit=service.takes,
-        unit="s",
-        at_s=float(report.times[first]),
-        message=f"{robot} stands for {longest:.4g} s where its tool is cleaned, {service.takes:g} s are demanded",
-    )
+    passed, value, at_s = bool(longest >= service.takes - PASSED), float(longest), float(report.times[first])
+    message = f"{robot} stands for {value:.4g} s where its tool is cleaned, {service.takes:g} s are demanded"
+    return Check("service", robot, passed, message, value=value, limit=service.takes, unit="s", at_s=at_s)

@@ -32,14 +32,9 @@ def check_arcs(
         worst = int(np.argmin(gaps))
         value, at_s = MM * float(gaps[worst]), float(times[rows[worst]])
         first, second = (it.task.name for it in pair)
-        yield Check(
-            name="arc_distance",
-            subject=f"{first}, {second}",
-            passed=value >= least,
-            value=value,
-            limit=float(least),
-            unit="mm",
-            at_s=at_s,
-            message=f"tips of tasks '{first}' and '{second}' on their paths: {value:.4g} mm apart at {at_s:.3f} s, at "
-            f"least {least:g} mm are demanded",
+        both, passed, limit = f"{first}, {second}", value >= least, float(least)
+        message = (
+            f"tips of tasks '{first}' and '{second}' on their paths: {value:.4g} mm apart at {at_s:.3f} s, at least "
+            f"{least:g} mm are demanded"
         )
+        yield Check("arc_distance", both, passed, message, value=value, limit=limit, unit="mm", at_s=at_s)

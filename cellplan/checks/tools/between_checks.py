@@ -79,20 +79,11 @@ def with_between(at_rows: Sequence[Check], between: Sequence[Check]) -> tuple[Ch
 def _check(name: str, error: BetweenError, subject: str, *, allowed: float, of: str) -> Check:
     """The largest error of one kind against its limit, with the step that would keep it."""
     unit, scale = MILLIMETRES if "position" in name else DEGREES
-    what = name.removesuffix(BETWEEN).replace("_", " ")
+    what, passed = name.removesuffix(BETWEEN).replace("_", " "), error.largest <= allowed
+    value, limit = scale * error.largest, scale * allowed
     message = (
-        f"{what} {of} between the rows of its table: {scale * error.largest:.3g} {unit} at {error.at_s:.4f} s, "
-        f"allowed {scale * allowed:g} {unit}"
+        f"{what} {of} between the rows of its table: {value:.3g} {unit} at {error.at_s:.4f} s, allowed {limit:g} {unit}"
     )
     if error.longest_step is not None:
         message += f"; a motion.step_s of at most {error.longest_step:g} meets the tolerance"
-    return Check(
-        name=name,
-        subject=subject,
-        passed=error.largest <= allowed,
-        value=scale * error.largest,
-        limit=scale * allowed,
-        unit=unit,
-        at_s=error.at_s,
-        message=message,
-    )
+    return Check(name, subject, passed, message, value=value, limit=limit, unit=unit, at_s=error.at_s)

@@ -43,22 +43,13 @@ def check_tool_speeds(cell: Cell, speeds: Mapping[str, RobotSpeed]) -> list[Chec
     limit = si_or_none(cell.checks.tool_speed_mm_s)
     if limit is None:
         return []
-    return [
-        Check(
-            name="tool_speed",
-            subject=name,
-            passed=speed.tool_peak <= limit,
-            value=MM * speed.tool_peak,
-            limit=MM * limit,
-            unit="mm/s",
-            at_s=speed.tool_peak_at_s,
-            message=(
-                f"tool of {name} has a peak speed of {MM * speed.tool_peak:.4g} mm/s in the world at "
-                f"{speed.tool_peak_at_s:.3f} s, allowed {MM * limit:g} mm/s"
-            ),
-        )
-        for name, speed in speeds.items()
-    ]
+    checks = []
+    for name, speed in speeds.items():
+        peak, most, at_s = MM * speed.tool_peak, MM * limit, speed.tool_peak_at_s
+        peak_words = f"has a peak speed of {peak:.4g} mm/s in the world at {at_s:.3f} s"
+        message, passed = f"tool of {name} {peak_words}, allowed {most:g} mm/s", speed.tool_peak <= limit
+        checks.append(Check("tool_speed", name, passed, message, value=peak, limit=most, unit="mm/s", at_s=at_s))
+    return checks
 
 
 def process_speeds(schedule: Schedule, X_WT: Mapping[str, Array], X_WP: Array) -> dict[str, ProcessSpeed]:

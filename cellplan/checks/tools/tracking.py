@@ -55,16 +55,8 @@ def worst_error(name: str, times: Array, error: Array, *, subject: str, limit: f
     worst = int(np.argmax(error))
     value, at_s = float(error[worst]), float(times[worst])
     unit, of = words
-    return Check(
-        name=name,
-        subject=subject,
-        passed=value <= limit,
-        value=value,
-        limit=limit,
-        unit=unit,
-        at_s=at_s,
-        message=f"{name.replace('_', ' ')} {of}: {value:.3g} {unit} at {at_s:.3f} s, allowed {limit:g} {unit}",
-    )
+    message = f"{name.replace('_', ' ')} {of}: {value:.3g} {unit} at {at_s:.3f} s, allowed {limit:g} {unit}"
+    return Check(name, subject, value <= limit, message, value=value, limit=limit, unit=unit, at_s=at_s)
 
 
 def check_closure(cell: Cell, times: Array, closures: Sequence[ClosureAccuracy]) -> list[Check]:

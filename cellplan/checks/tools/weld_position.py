@@ -60,14 +60,10 @@ def _within(
     what = {"torch_angle": "angle of the tool from gravity", "weld_slope": "slope of the weld"}
     allowed = f"at most {np.degrees(high):g}" if np.isinf(low) else f"{np.degrees(low):g} to {np.degrees(high):g}"
     named = f", position {position}" if position else ""
-    return Check(
-        name=name,
-        subject=task,
-        passed=bool(low - ROUNDING <= value <= high + ROUNDING),
-        value=float(np.degrees(value)),
-        limit=float(np.degrees(limit)),
-        unit="deg",
-        at_s=float(times[worst]),
-        message=f"{what.get(name, 'rotation of the weld')} of task '{task}': {np.degrees(value):.4g} deg at "
-        f"{times[worst]:.3f} s{named}, allowed {allowed} deg",
+    passed, at_s = bool(low - ROUNDING <= value <= high + ROUNDING), float(times[worst])
+    value, limit = float(np.degrees(value)), float(np.degrees(limit))
+    message = (
+        f"{what.get(name, 'rotation of the weld')} of task '{task}': {value:.4g} deg at {at_s:.3f} s{named}, "
+        f"allowed {allowed} deg"
     )
+    return Check(name, task, passed, message, value=value, limit=limit, unit="deg", at_s=at_s)

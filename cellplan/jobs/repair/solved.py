@@ -85,17 +85,13 @@ class SolvedCell:
             if not demanded > 0.0 or not np.isfinite(use.margin):
                 continue
             unit, scale = use.display_unit
-            check = Check(
-                name=MARGIN,
-                subject=f"{use.robot}/{use.joint}",
-                passed=use.margin >= demanded - ROUNDING,
-                value=scale * use.margin,
-                limit=scale * demanded,
-                unit=unit,
-                at_s=use.margin_at_s,
-                message=f"joint {use.robot}/{use.joint} stays {scale * use.margin:.4g} {unit} inside its limits, "
-                f"{scale * demanded:.4g} {unit} demanded, worst at {use.margin_at_s:.3f} s",
+            joint, value, limit = f"{use.robot}/{use.joint}", scale * use.margin, scale * demanded
+            message = (
+                f"joint {joint} stays {value:.4g} {unit} inside its limits, {limit:.4g} {unit} demanded, worst at "
+                f"{use.margin_at_s:.3f} s"
             )
+            passed = use.margin >= demanded - ROUNDING
+            check = Check(MARGIN, joint, passed, message, value=value, limit=limit, unit=unit, at_s=use.margin_at_s)
             checks.append(_of_phase(phase, check))
         return checks
 

@@ -1,7 +1,7 @@
 """Report: every verified statement with its margin, where and when it is worst, and the series behind the plots."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
 
 from cellplan.geometry.transforms import Array
@@ -39,7 +39,7 @@ class ClearanceClass(StrEnum):
     ENVIRONMENT = "environment"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Check:
     """One verified statement.
 
@@ -47,21 +47,22 @@ class Check:
         name: What was checked, one of ``CHECK_KINDS``.
         subject: Robot and joint, task, or pair of bodies.
         passed: The verdict.
+        message: One line of text: what, by how much, where, when.
         value: The worst value, in ``unit``.
         limit: The allowed value, in ``unit``.
         unit: Unit of value and limit as printed.
         at_s: Time of the worst value in [s]; None without a time.
-        message: One line of text: what, by how much, where, when.
     """
 
     name: str
     subject: str
     passed: bool
+    message: str
+    _: KW_ONLY
     value: float
     limit: float
     unit: str
     at_s: float | None
-    message: str
 
     def __post_init__(self) -> None:
         """A name that is not in the catalogue does not exist."""
