@@ -1,7 +1,6 @@
 """The certificate: the one entry of this layer."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -16,7 +15,7 @@ from cellplan.model.report.report import ClearanceClass
 from cellplan.scene.collision.continuous.motion_bound import BodyMotion, Pair
 from cellplan.scene.collision.distance import TIGHT_TOL, Reading, measure
 from cellplan.scene.collision.engine import Engine
-from cellplan.scene.pairs import Rule, ScenePair
+from cellplan.scene.pairs import ScenePair
 from cellplan.scene.scene import Scene
 
 CHUNK_WORK: Final = 400_000  # bodies times samples searched at once: 40 MB of poses
@@ -32,10 +31,10 @@ CURVE_TOL: Final = 1e-3  # [m] likewise by this length
 def certify(
     scene: Scene,
     q: Array,
-    demand: float | None = None,
     *,
     with_minimum: bool = True,
     with_curves: bool = True,
+    arms: LeverArms | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Bound:
     """Bound the distance of every pair of bodies from below, at the samples of a motion and between them.
@@ -46,16 +45,13 @@ def certify(
     Args:
         scene: The scene; the rules of its pairs may depend on the run, see ``scene_of_run``.
         q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2.
-        demand: Distance in [m] that pairs with the rule ``clearance`` are to keep; that of the scene when None.
         with_minimum: Whether the smallest distances are searched for too. Otherwise the search ends with the first pair
             that does not keep its demand, and only ``Bound.is_met`` of the result is valid.
         with_curves: Whether the bounds of each class are then raised in every block, to be drawn; the verdict and the
             smallest distances are known before.
+        arms: The lever arms of the cell over the motion, where they are known.
     """
-    if demand is not None:
-        pairs = (replace(pair, demand=demand) if pair.rule is Rule.CLEARANCE else pair for pair in scene.pairs)
-        scene = replace(scene, pairs=tuple(pairs))
-    survey, arms = Survey(scene, q), LeverArms(scene, q)
+    survey, arms = Survey(scene, q), arms or LeverArms(scene, q)
     for first, last in _stretches(survey):
         motion = StraightMotion.of_cell(scene, arms, q[survey.edges[first] : survey.edges[last] + 1])
         stretch = StretchSearch(survey, motion, first, last)

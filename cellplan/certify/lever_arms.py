@@ -75,8 +75,16 @@ class LeverArms:
         self._columns = np.array([axis.column for axis in self._placed], dtype=np.intp)
         self._ratios = np.array([axis.ratio for axis in self._placed])
         self._turns = np.array([float(axis.is_revolute) for axis in self._placed])
+        self._slides = self._slides_in(q)
+
+    def over(self, q: Array) -> "LeverArms":
+        """Those of another program in the same cell: these themselves where no joint slides by another length."""
+        return self if np.array_equal(self._slides_in(q), self._slides) else LeverArms(self._scene, q)
+
+    def _slides_in(self, q: Array) -> Array:
+        """By how much each axis slides at most from its reference configuration in [m], 0 for one that turns."""
         positions = q[:, self._columns] * self._ratios + np.array([axis.offset for axis in self._placed])
-        self._slides = np.abs(positions).max(axis=0, initial=0.0) * (1.0 - self._turns)
+        return np.abs(positions).max(axis=0, initial=0.0) * (1.0 - self._turns)
 
     def steps(self, q: Array) -> Array:
         """By how much each axis moves from row to row, without its sign, in [rad] or [m], shape (n - 1, axes)."""

@@ -14,6 +14,8 @@ from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.task.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind
+from cellplan.scene.pairs import Rule
+from cellplan.scene.scene import Scene
 
 QUARTER = 0.5 * np.pi
 
@@ -180,3 +182,9 @@ def displaced(cell: Cell, X: Array) -> Cell:
         part=part,
         obstacles=tuple(replace(obstacle, X_WS=X @ obstacle.X_WS) for obstacle in cell.obstacles),
     )
+
+
+def demanding(scene: Scene, demand: float) -> Scene:
+    """The scene in which pairs with the rule ``clearance`` are to keep a distance in [m]."""
+    pairs = (replace(pair, demand=demand) if pair.rule is Rule.CLEARANCE else pair for pair in scene.pairs)
+    return replace(scene, pairs=tuple(pairs))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders.moving_cells import cell_with_bodies, program
-from builders.scene_builders import body, displaced, joint, make_cell, placed, slide_model, thing
+from builders.scene_builders import body, demanding, displaced, joint, make_cell, placed, slide_model, thing
 
 from cellplan.certify.bound import Bound, PairBound
 from cellplan.certify.certify import certify
@@ -130,4 +130,4 @@ def test_an_arm_that_stretches_out_and_draws_back_within_one_step_is_as_near_as_
 
     assert gap - EXACT <= bound.minimum <= gap
     for demand, is_met in ((gap - EXACT, True), (gap + 0.01, False)):
-        assert certify(scene, q, demand, with_minimum=False).is_met is is_met
+        assert certify(demanding(scene, demand), q, with_minimum=False).is_met is is_met

@@ -5,7 +5,7 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 from builders.moving_cells import cell_with_bodies
-from builders.scene_builders import body, floor, joint, make_cell, placed, slide_model, thing
+from builders.scene_builders import body, demanding, floor, joint, make_cell, placed, slide_model, thing
 
 from cellplan.certify.certify import certify
 from cellplan.geometry.shapes import Sphere
@@ -53,14 +53,14 @@ def test_the_minimum_of_two_passing_balls_is_the_gap_between_them() -> None:
 def test_a_demand_is_kept_up_to_the_gap(demand: float, is_met: bool, with_minimum: bool) -> None:
     scene, q = passing_ball()
 
-    assert certify(scene, q, demand, with_minimum=with_minimum).is_met is is_met
+    assert certify(demanding(scene, demand), q, with_minimum=with_minimum).is_met is is_met
 
 
 @pytest.mark.parametrize("with_minimum", [True, False])
 def test_bodies_that_touch_keep_no_demand(with_minimum: bool) -> None:
     scene, q = passing_ball(gap=-0.01)
 
-    bound = certify(scene, q, 0.0, with_minimum=with_minimum)
+    bound = certify(demanding(scene, 0.0), q, with_minimum=with_minimum)
 
     assert not bound.is_met
     assert bound.minimum == 0.0
@@ -76,7 +76,7 @@ def test_the_verdict_alone_is_that_of_the_whole_search_with_fewer_queries(seed: 
 
     for demand in (0.5 * bound.minimum, 2.0 * bound.minimum + 0.01):
         scene = Scene.from_cell(cell)
-        verdict = certify(scene, q, demand, with_minimum=False).is_met
+        verdict = certify(demanding(scene, demand), q, with_minimum=False).is_met
         assert verdict is (is_free and demand <= bound.minimum)
         assert scene.engine.queries.distances < whole.engine.queries.distances
 
@@ -85,7 +85,7 @@ def test_nothing_is_claimed_of_blocks_after_the_verdict(monkeypatch: pytest.Monk
     monkeypatch.setattr("cellplan.certify.certify.MAX_SAMPLES", 16)
     scene, q = passing_ball()
 
-    bound = certify(scene, q, 0.2, with_minimum=False)
+    bound = certify(demanding(scene, 0.2), q, with_minimum=False)
 
     assert not bound.is_met
     assert np.all(np.isneginf(bound.low[:, -1]))
@@ -126,7 +126,7 @@ def test_the_lowest_point_of_a_swing_above_the_floor_is_found_between_two_sample
     )
     q = np.array([[-0.9], [-0.5], [-0.1], [0.3], [0.7]])
 
-    bound = certify(Scene.from_cell(cell), q, 0.3)
+    bound = certify(demanding(Scene.from_cell(cell), 0.3), q)
 
     (pair,) = [pair for pair in bound.pairs if bound.names(pair) == ("arm/ball", "floor")]
     assert 0.35 - EXACT <= pair.lowest <= 0.35

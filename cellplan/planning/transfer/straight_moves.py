@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.certify.certify import certify
+from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.run_pairs import scene_of_rows
 from cellplan.geometry.arrays import Array
 from cellplan.model.robot.robot import BASE
@@ -32,6 +33,7 @@ class StraightMoves:
         self._scene = scene
         self._apart_in_rows = dict[Move, bool]()  # whether all of its pairs keep their distance there
         self._certified = dict[Move, bool]()
+        self._arms: LeverArms | None = None  # of the last moves
 
     def refusing(self, start: Array, goal: Array, movers: Collection[str]) -> Carriers | None:
         """Robots that carry the bodies of a pair that comes too near in a straight move; None where none does.
@@ -89,9 +91,10 @@ class StraightMoves:
 
     def _certify(self, moves: list[Move], line: Array) -> None:
         """Certify moves along a line; as a certificate ends with the first fault, those that have none again."""
+        self._arms = LeverArms(self._scene, line) if self._arms is None else self._arms.over(line)
         while moves:
             rows = [row for carriers, _ in moves for row in self._rows[carriers]]
-            bound = certify(scene_of_rows(self._scene, rows), line, with_minimum=False)
+            bound = certify(scene_of_rows(self._scene, rows), line, with_minimum=False, arms=self._arms)
             at_fault = {
                 self._carriers[row]
                 for row, it in zip(rows, bound.states, strict=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from builders.scene_builders import held_part, make_cell, placed, slide_model, thing
+from builders.scene_builders import demanding, held_part, make_cell, placed, slide_model, thing
 from builders.transfer_cells import CHECKS, arm, scene_of
 
 from cellplan.certify.certify import certify
@@ -37,7 +37,7 @@ def test_moves_are_free_where_the_certificate_says_so(among_posts: Scene) -> Non
         verdicts.append(is_free)
         # what is refused lacks the reserve at a sample: it may keep the demand, but not much more
         demand = CHECKS.clearance_mm.si if is_free else CHECKS.clearance_mm.si + 2.0 * RESERVE
-        assert certify(among_posts, q, demand, with_minimum=False).is_met is is_free
+        assert certify(demanding(among_posts, demand), q, with_minimum=False).is_met is is_free
 
     assert 2 <= sum(verdicts) <= 8
 
