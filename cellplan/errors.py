@@ -102,6 +102,20 @@ class NotVerifiedError(CellplanError):
         self.findings = findings
 
 
+class LineRefusedError(NotVerifiedError):
+    """A tool cannot move on the lines and arcs of a task as it must.
+
+    Attributes:
+        task: Name of the task.
+        reason: Why not, with its place.
+    """
+
+    def __init__(self, task: str, reason: str) -> None:
+        """Name the task before the reason, which begins with ``:`` or ``,``."""
+        super().__init__([f"task '{task}'{reason}"])
+        self.task, self.reason = task, reason.lstrip(":, ")
+
+
 class StartOutsideLimitsError(InputError):
     """A start posture given in the cell lies outside the joint limits."""
 

@@ -11,7 +11,7 @@ from typing import Final, Literal, NamedTuple, NoReturn
 
 import numpy as np
 
-from cellplan.errors import InputError, NotVerifiedError
+from cellplan.errors import InputError, LineRefusedError
 from cellplan.geometry.transforms import Array
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows, Seam
 from cellplan.model.units import MM
@@ -117,7 +117,7 @@ class Events:
 def moves_of(job: ExportJob, program: ProgramRows, events: Events) -> tuple[Move, ...]:
     """The moves of a robot in a program, in their order.
 
-    ``NotVerifiedError`` where a corner in process would have to be a stop, which ends an arc.
+    ``LineRefusedError`` where a corner in process would have to be a stop, which ends an arc.
     """
     rows, shares = program.robots[events.robot], row_shares(job, program)[events.robot]
     on_seam, has_process = rows.on_seam, events.form is not None
@@ -134,12 +134,10 @@ def moves_of(job: ExportJob, program: ProgramRows, events: Events) -> tuple[Move
         if has_process and (before or (after and on_seam[row])):
             which = "on" if not before else "inner" if after else "off"
         if which == "inner" and seam is not None and zone <= 0.0:
-            raise NotVerifiedError(
-                [
-                    f"task '{seam.task}': row {row + 1}: a corner in process that no zone within its tolerance rounds "
-                    f"would be a stop, which ends the process: divide the task there, {events.cure}, or write joints "
-                    "(--moves joints)"
-                ]
+            raise LineRefusedError(
+                seam.task,
+                f": row {row + 1}: a corner in process that no zone within its tolerance rounds would be a stop, which "
+                f"ends the process: divide the task there, {events.cure}, or write joints (--moves joints)",
             )
         moves.append(
             Move(

@@ -1,13 +1,13 @@
 """Prepared: all that a format is to write of a run, promised and shaped, before any text."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from cellplan.errors import InputError, InvalidFileError, NotVerifiedError, raise_findings, refusals
+from cellplan.errors import InputError, InvalidFileError, LineRefusedError, NotVerifiedError, raise_findings, refusals
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise
+from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, ProgramRows, Promise
 from cellplan.model.report.verified_run import AnyRun, ReadRun, UnsolvedRun, VerifiedRun
 from cellplan.model.units import DEG, MM
 from cellplan.programs.elements.dialect import Dialect
@@ -24,7 +24,8 @@ from cellplan.programs.rows.part_targets import with_part_poses
 from cellplan.programs.rows.resample import lead_time, resampled
 from cellplan.programs.rows.rows import essential_rows, full_rows
 from cellplan.programs.rows.thin import ThinningLimits, thinned
-from cellplan.programs.seams.choose import with_seams
+from cellplan.programs.seams.choose import on_moving_parts, with_seams
+from cellplan.programs.seams.executed import executed_programs
 from cellplan.programs.shared import Shared
 
 FINER: Final = 0.3  # [-] of the usual thinning, where no rounding keeps the demands with that: it adds rows, not stops
@@ -47,10 +48,22 @@ class PreparedExport:
     shared: Shared  # what exports of the run share
 
 
+class _NoLineError(NotVerifiedError):
+    """No task of a run is left whose tool can move on lines and arcs."""
+
+
 def prepare(
-    run: VerifiedRun, dialect: Dialect, choice: Choice, *, shared: Shared | None = None, progress: Progress = silent
+    run: VerifiedRun,
+    dialect: Dialect,
+    choice: Choice,
+    *,
+    shared: Shared | None = None,
+    progress: Progress = silent,
+    no_line: str | None = None,
 ) -> PreparedExport:
     """Choose promise, marks and rows of an export; ``shared`` is None for one export only.
+
+    ``no_line`` says why no tool moves on lines where it is known that none can.
 
     Raises:
         InputError: The format cannot write this, or something is not stated in the cell.
@@ -60,22 +73,30 @@ def prepare(
     shared = shared or Shared(run)
     robots = exported_robots(run.cell, dialect, choice.robots)
     skew = run_skew(run) if Promise.TIMED in dialect.promises else None
-    promised = choose_promise(run, dialect, robots, skew=skew, requested=choice.promise, moves=choice.moves)
+    moves = choice.moves if no_line is None else Moves.JOINTS
+    promised = choose_promise(run, dialect, robots, skew=skew, requested=choice.promise, moves=moves)
+    if no_line is not None:
+        promised = replace(promised, reasons=(*promised.reasons, f"not {Promise.PACED}: {no_line}"))
     frame = frame_of(run, robots, promised.promise, choice)
     raise_findings(unmet_demands(run, dialect, frame, choice))
     has_waits = promised.promise.waits and len(run.cell.robots) > 1
     orders = shared.orders(progress) if has_waits else ()
-    job, lead = _job(shared, dialect, choice, frame=frame, orders=orders)
+    try:
+        job, lead, by_joints = _job(shared, dialect, choice, frame=frame, orders=orders)
+    except _NoLineError as error:
+        if choice.promise is Promise.PACED:
+            raise
+        return prepare(run, dialect, choice, shared=shared, progress=progress, no_line="; ".join(error.findings))
     is_rounded = dialect.is_rounded and not is_at_cycle(dialect, frame.promise)
     stops, count = stops_left(job) if is_rounded else (0, 0)
     if stops > FEW_STOPS * count and not choice.is_thinned and frame.promise is not Promise.PACED:
         finer = replace(choice, thin_mm=FINER * THIN_MM, thin_deg=FINER * THIN_DEG)
-        other, _ = _job(shared, dialect, finer, frame=frame, orders=orders)
+        other, *_ = _job(shared, dialect, finer, frame=frame, orders=orders)
         job, choice = (other, finer) if stops_left(other)[0] < stops else (job, choice)
     return PreparedExport(
         dialect=dialect,
         job=job,
-        promised=promised,
+        promised=replace(promised, remarks=(*promised.remarks, *by_joints)),
         requested=choice.promise,
         skew=skew if promised.promise is Promise.TIMED else None,
         orders=orders,
@@ -87,7 +108,7 @@ def prepare(
 
 def _job(
     shared: Shared, dialect: Dialect, choice: Choice, *, frame: ExportFrame, orders: Sequence[Orders]
-) -> tuple[ExportJob, float]:
+) -> tuple[ExportJob, float, tuple[str, ...]]:
     """The rows of an export, rounded as far as the cell allows it; and by how much they are later."""
     programs, lead = _shaped(shared, dialect, choice, frame=frame, orders=orders)
     if frame.has_part_targets:
@@ -97,11 +118,47 @@ def _job(
         as_poses = frame.has_part_targets or frame.promise is Promise.PACED
         read = None if as_poses else dialect.read(frame, dialect.render(job))
         job = with_rounding(dialect, job, shared=shared, read=read, orders=orders, lead=lead)
-    if frame.promise is Promise.PACED:
-        full = _with_orders(full_rows(shared.run), orders)
-        most = (THIN_MM if choice.thin_mm is None else choice.thin_mm) / MM
-        job = with_seams(shared.scene, job, full, essential_rows(shared.run), most=most)
-    return job, lead
+    if frame.promise is not Promise.PACED:
+        return job, lead, ()
+    most = (THIN_MM if choice.thin_mm is None else choice.thin_mm) / MM
+    job, by_joints = _with_lines(shared, dialect, job, _with_orders(full_rows(shared.run), orders), most=most)
+    return job, lead, tuple(_moved_by_joints(frame, by_joints))
+
+
+def _with_lines(
+    shared: Shared, dialect: Dialect, job: ExportJob, full: tuple[ProgramRows, ...], *, most: float
+) -> tuple[ExportJob, dict[str, str]]:
+    """A job with lines and arcs, and why the tools of some tasks move by joints instead, by their names.
+
+    ``NotVerifiedError`` where none may, as the moves are to be linear, and ``_NoLineError`` where all would have to.
+    """
+    frame, essential = job.frame, essential_rows(shared.run)
+    by_joints: dict[str, str] = {}
+    for task, holder in on_moving_parts(full, essential):
+        if frame.cell.task(task).robot in frame.robots:
+            by_joints[task] = f"'{holder}' moves the part while the tool works"
+            if frame.moves is Moves.LINEAR:
+                raise NotVerifiedError([f"--moves linear: task '{task}': {by_joints[task]}"])
+    while True:
+        lines = with_seams(shared.scene, job, full, essential, most=most, by_joints=by_joints)
+        if frame.moves is Moves.LINEAR:
+            return lines, by_joints
+        if not any(rows.seams for program in lines.programs for rows in program.robots.values()):
+            raise _NoLineError([f"task '{task}': {reason}" for task, reason in by_joints.items()])
+        try:
+            executed_programs(lines, dialect, full, dialect.read(frame, dialect.render(lines)))
+        except LineRefusedError as error:
+            by_joints[error.task] = error.reason
+        else:
+            return lines, by_joints
+
+
+def _moved_by_joints(frame: ExportFrame, by_joints: Mapping[str, str]) -> Iterator[str]:
+    """What is said of tasks whose tools move by joints."""
+    for task, reason in by_joints.items():
+        has_process = frame.cell.task(task).process is not None
+        without = ", without statements of its process" if has_process else ""
+        yield f"task '{task}' moves by joints, at no programmed speed{without}: {reason}"
 
 
 def frame_of(run: AnyRun, robots: Sequence[str], promise: Promise, choice: Choice) -> ExportFrame:

@@ -1,17 +1,16 @@
 """Seams chosen from a run: few lines and arcs that follow a tool, where the part rests while it works."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from cellplan.errors import NotVerifiedError
 from cellplan.geometry.transforms import Array, inverse, rotation_vector
 from cellplan.measures.tool_errors import error_lengths, part_poses
 from cellplan.model.cell.cell import Cell
-from cellplan.model.report.exported import ExportJob, Moves, ProgramRows, RobotRows, Seam
+from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows, Seam
 from cellplan.model.task.task import Frame, Task
 from cellplan.programs.elements.corners import LARGEST_SHARE, switches
 from cellplan.programs.rows.part_targets import LEFT_OVER
@@ -110,26 +109,42 @@ class ToolPath:
 
 
 def with_seams(
-    scene: Scene, job: ExportJob, full: Sequence[ProgramRows], essential: Sequence[EssentialRows], *, most: float
+    scene: Scene,
+    job: ExportJob,
+    full: Sequence[ProgramRows],
+    essential: Sequence[EssentialRows],
+    *,
+    most: float,
+    by_joints: Collection[str] = (),
 ) -> ExportJob:
-    """A job whose robots move their tools on lines and arcs wherever these work on a part that rests.
+    """A job whose robots move their tools on lines and arcs, but for some tasks, which have no process then.
 
     Args:
         job: Rows of joints, some left out, with their marks and their rounding.
         full: All rows of its programs, with the same marks.
         essential: The phases of its programs.
         most: How far a tool may be off its path by rows left out, in [m].
-
-    Raises:
-        NotVerifiedError: The moves are to be linear, and a part moves while a tool works on it.
+        by_joints: Names of tasks whose tools move by joints; on all others the part rests, see ``on_moving_parts``.
     """
     programs = []
     for program, every, phases in zip(job.programs, full, essential, strict=True):
         robots = {
-            name: _seams_of(scene, job, (rows, every), phases.work, most=most) for name, rows in program.robots.items()
+            name: _seams_of(scene, job, (rows, every), phases.work, most=most, by_joints=by_joints)
+            for name, rows in program.robots.items()
         }
         programs.append(replace(program, robots=robots))
     return replace(job, programs=tuple(programs))
+
+
+def on_moving_parts(full: Sequence[ProgramRows], essential: Sequence[EssentialRows]) -> Iterator[tuple[str, str]]:
+    """Names of the tasks whose part moves while the tool works, each with the robot that moves it."""
+    for program, phases in zip(full, essential, strict=True):
+        for phase in phases.work:
+            for task in map(phase.cell.task, phase.tasks):
+                for holder in phase.cell.part.held_by if task.relative_to is Frame.PART else ():
+                    q = program.robots[holder.robot].q[phase.rows]
+                    if np.any(np.abs(q - q[0]) > STILL_TOL):
+                        yield task.name, holder.robot
 
 
 def reference_pose(cell: Cell, chains: Mapping[str, ScrewChain], task: Task, q: Mapping[str, Array]) -> Array:
@@ -170,6 +185,13 @@ class _SeamRows:
             self.rounding[first + row] = 0.0 if is_stop else share
         self.seams.append((path.task.name, first, last))
 
+    def switch_off(self, first: int, last: int) -> None:
+        """No process is on between two rows, where nothing that controllers know as a seam begins it."""
+        if self.rows.process is not None:
+            process = self.rows.process.copy()
+            process[first:last] = False
+            self.rows = replace(self.rows, process=process)
+
     def straighten(self, first: int, last: int) -> None:
         """Leave out rows that the path of the joints does not need, whatever their times, as robots wait at marks.
 
@@ -206,7 +228,13 @@ class _SeamRows:
 
 
 def _seams_of(
-    scene: Scene, job: ExportJob, both: tuple[RobotRows, ProgramRows], work: Sequence[WorkRows], *, most: float
+    scene: Scene,
+    job: ExportJob,
+    both: tuple[RobotRows, ProgramRows],
+    work: Sequence[WorkRows],
+    *,
+    most: float,
+    by_joints: Collection[str],
 ) -> RobotRows:
     """The rows of one robot, with its seams; ``both`` are those of its joints, and all of the program."""
     thinned, every = both
@@ -217,34 +245,23 @@ def _seams_of(
         scene=scene, rows=rows, chosen=set(chosen), rounding=dict(zip(chosen, shares.tolist(), strict=True))
     )
     for phase in work:
-        path = _path(scene, job, every, thinned.robot, phase, most)
         first, last = phase.rows.start, min(phase.rows.stop, len(rows)) - 1
-        if path is None:
+        task = next((task for task in map(phase.cell.task, phase.tasks) if task.robot == thinned.robot), None)
+        if task is None:
             state.straighten(first, last)
+        elif task.name in by_joints:
+            state.switch_off(first, last)
         else:
-            state.follow(path, first, last)
+            state.follow(_path(scene, every, task, phase, most), first, last)
     return state.assembled()
 
 
-def _path(
-    scene: Scene, job: ExportJob, every: ProgramRows, robot: str, phase: WorkRows, most: float
-) -> ToolPath | None:
-    """The path of the tool of a robot in a phase; None where it has no task there, or moves its joints."""
-    task = next((phase.cell.task(name) for name in phase.tasks if phase.cell.task(name).robot == robot), None)
-    if task is None:
-        return None
+def _path(scene: Scene, every: ProgramRows, task: Task, phase: WorkRows, most: float) -> ToolPath:
+    """The path of the tool of a task in a phase."""
     q = {name: rows.q[phase.rows] for name, rows in every.robots.items()}
-    holders = phase.cell.part.held_by if task.relative_to is Frame.PART else ()
-    for holder in holders:
-        if np.any(np.abs(q[holder.robot] - q[holder.robot][0]) > STILL_TOL):
-            if job.frame.moves is Moves.LINEAR:
-                raise NotVerifiedError(
-                    [f"--moves linear: '{holder.robot}' moves the part while the tool of task '{task.name}' works"]
-                )
-            return None
     start = {name: positions[0] for name, positions in q.items()}
     X_PW = inverse(reference_pose(phase.cell, scene.chains, task, start))
-    return ToolPath(task=task, X_PT=X_PW @ scene.chains[robot].tool_poses(q[robot]), most=most)
+    return ToolPath(task=task, X_PT=X_PW @ scene.chains[task.robot].tool_poses(q[task.robot]), most=most)
 
 
 def _shorter(q: Array, places: Sequence[int]) -> dict[int, float]:

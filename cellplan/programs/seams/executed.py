@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.errors import InputError, NotVerifiedError
+from cellplan.errors import InputError, LineRefusedError, NotVerifiedError
 from cellplan.geometry.transforms import Array, inverse, rotation_vector
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows, Seam
@@ -126,8 +126,8 @@ class SeamExecution:
             end = rows.X_PT[last]
             shape = arc(X, rows.X_PT[first + 1], end) if is_arc else line(X, end)
             if shape is None:
-                raise NotVerifiedError(
-                    [f"task '{seam.task}': row {last}: no arc of at most {DEG * LARGEST_ARC:.0f} deg leads through it"]
+                raise LineRefusedError(
+                    seam.task, f": row {last}: no arc of at most {DEG * LARGEST_ARC:.0f} deg leads through it"
                 )
             path = self._path(seam, (first, last), shape, X_WP, (q, travelled))
             paths.append((last, path))
@@ -245,11 +245,10 @@ def _require_reached(robot: Robot, seam: Seam, q: Array, misses: Array, places: 
     if np.any(jumps | missed):
         step = int(np.argmax(jumps | missed))
         joint = robot.model.joints[int(np.argmax(steps[step]))].name
-        raise NotVerifiedError(
-            [
-                f"task '{seam.task}', {places[step + 1]:.1f} mm along its seam: no continuous motion of the joints "
-                f"follows the line, as joint {joint} of '{robot.name}' passes near a singular configuration"
-            ]
+        raise LineRefusedError(
+            seam.task,
+            f", {places[step + 1]:.1f} mm along its seam: no continuous motion of the joints follows the line, as "
+            f"joint {joint} of '{robot.name}' passes near a singular configuration",
         )
 
 
@@ -257,15 +256,13 @@ def _require_limits(robot: Robot, seam: Seam, q: Array, places: Array, *, feed: 
     """No joint leaves its limits, nor moves faster than it may while the tool moves at its speed."""
     model = robot.model
     beyond = np.maximum(model.lower - q, q - model.upper)
-    where = f"task '{seam.task}'"
     if np.any(beyond > POSE_TOL):
         row, index = (int(place) for place in np.unravel_index(np.argmax(beyond), beyond.shape))
         unit, scale = model.joints[index].display_unit
-        raise NotVerifiedError(
-            [
-                f"{where}, {places[row]:.1f} mm along its seam: joint {model.joints[index].name} of "
-                f"'{robot.name}' leaves its limits by {scale * float(beyond[row, index]):.3g} {unit}"
-            ]
+        raise LineRefusedError(
+            seam.task,
+            f", {places[row]:.1f} mm along its seam: joint {model.joints[index].name} of '{robot.name}' leaves its "
+            f"limits by {scale * float(beyond[row, index]):.3g} {unit}",
         )
     moved = np.diff(lengths)
     rates = np.abs(np.diff(q, axis=0))[moved > STANDS] * (feed / moved[moved > STANDS])[:, None]
@@ -273,13 +270,11 @@ def _require_limits(robot: Robot, seam: Seam, q: Array, places: Array, *, feed: 
     if rates.size and np.any(rates > (1.0 + SPEED_TOL) * limits):
         row, index = (int(place) for place in np.unravel_index(np.argmax(rates / limits), rates.shape))
         unit, scale = model.joints[index].display_unit
-        raise NotVerifiedError(
-            [
-                f"{where}, {places[1:][moved > STANDS][row]:.1f} mm along its seam: joint "
-                f"{model.joints[index].name} of '{robot.name}' would move at "
-                f"{scale * float(rates[row, index]):.4g} {unit}/s at {MM * feed:.4g} mm/s, allowed "
-                f"{scale * float(limits[index]):.4g}"
-            ]
+        raise LineRefusedError(
+            seam.task,
+            f", {places[1:][moved > STANDS][row]:.1f} mm along its seam: joint {model.joints[index].name} of "
+            f"'{robot.name}' would move at {scale * float(rates[row, index]):.4g} {unit}/s at {MM * feed:.4g} mm/s, "
+            f"allowed {scale * float(limits[index]):.4g}",
         )
 
 

@@ -287,26 +287,58 @@ def test_a_line_at_a_speed_that_a_joint_cannot_follow_is_refused(frame: ExportFr
     assert re.search(r"joint J\d of 'arm' would move at \d.* deg/s at 4e\+04 mm/s, allowed", message)
 
 
-@pytest.mark.slow
-def test_a_ring_and_a_corner_are_jobs_of_a_yaskawa_arm(tmp_path: Path) -> None:
-    """Its position levels round what may be rounded, and the jobs that are written are verified as they lie there."""
-    text = BEAD.read_text(encoding="utf-8")
-    statements = 'process: {on: "ARCON ASF#(1)", off: "ARCOF AEF#(1)"}\n    position_levels_mm: [0.25, 0.5, 1, 2]'
+@pytest.fixture(scope="module")
+def yaskawa(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the solved cell with an arm of Yaskawa, and of what states other position levels."""
+    folder, text = tmp_path_factory.mktemp("yaskawa"), BEAD.read_text(encoding="utf-8")
+    statements = 'process: {on: "ARCON ASF#(1)", off: "ARCOF AEF#(1)"}\n    position_levels_mm: [0.15, 0.5, 1, 2]'
     text = re.sub(r"process:\n +on:.*\n +inner:.*\n +off:.*\n +data:.*", statements, text, count=1)
     text = text.replace("kind: abb", "kind: yaskawa").replace("{id: irc5,", "{id: irc5, tool_number: 1, frames: [1],")
-    (tmp_path / "cell.yaml").write_text(text.replace("position_mm: 0.5", "position_mm: 1.5"), encoding="utf-8")
+    (folder / "cell.yaml").write_text(text, encoding="utf-8")
+    for name, levels in (("coarse", "0.5"), ("coarsest", "5")):
+        stated = f"controllers: {{irc5: {{position_levels_mm: [{levels}]}}}}"
+        (folder / f"{name}.yaml").write_text(stated, encoding="utf-8")
+    assert run_command("cellplan solve cell.yaml -o run --quiet", folder)[0] == 0
+    return folder
 
-    for command in (
-        "solve cell.yaml -o run --quiet",
-        "export run --cell cell.yaml --format inform --moves linear -o jobs",
-        "verify jobs --run run --cell cell.yaml",
-    ):
-        assert run_command(f"cellplan {command}", tmp_path)[0] == 0
 
-    ring, corner = ((tmp_path / "jobs" / f"{name}.JBI").read_text(encoding="utf-8") for name in ("RING", "CORNER"))
+@pytest.mark.slow
+def test_a_ring_and_a_corner_are_jobs_of_a_yaskawa_arm(yaskawa: Path) -> None:
+    """Its position levels round what may be rounded, and the jobs that are written are verified as they lie there."""
+    export = "cellplan export run --cell cell.yaml --format inform --moves linear -o jobs"
+    for command in (export, "cellplan verify jobs --run run --cell cell.yaml"):
+        assert run_command(command, yaskawa)[0] == 0
+
+    ring, corner = ((yaskawa / "jobs" / f"{name}.JBI").read_text(encoding="utf-8") for name in ("RING", "CORNER"))
     assert re.findall(r"MOV(.) C\d+ V=40\.0 PL=(\d)", ring) == [
         *[("C", "0"), ("C", "1"), ("C", "2")],  # each arc begins where the tool is
         *[("L", "2"), ("C", "2"), ("C", "1"), ("C", "2")],
         *[("L", "2"), ("C", "2"), ("C", "1"), ("C", "0")],
     ]
-    assert re.findall(r"MOV(.) C\d+ V=40\.0 PL=(\d)", corner) == [("L", "2"), ("L", "0")]
+    assert re.findall(r"MOV(.) C\d+ V=40\.0 PL=(\d)", corner) == [("L", "1"), ("L", "0")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("levels", "jobs", "said"),
+    [
+        ("coarse", ["ARM.JBI", "RING.JBI"], "promise: paced"),
+        ("coarsest", ["ARM.JBI"], "not paced: task 'ring': row "),
+    ],
+)
+def test_tasks_whose_lines_are_refused_move_by_joints(yaskawa: Path, levels: str, jobs: list[str], said: str) -> None:
+    """The first level alone rounds the corner by more than it may be, the second one the ring too."""
+    options = f"--cell cell.yaml --controllers {levels}.yaml"
+    export = f"cellplan export run {options} --format inform -o {levels} --moves"
+
+    status, _, error = run_command(f"{export} linear", yaskawa)
+    assert status == 1
+    assert "a corner in process" in error
+    status, output, _ = run_command(f"{export} auto", yaskawa)
+
+    assert status == 0
+    assert said in output
+    assert "task 'corner'" in output
+    assert sorted(path.name for path in (yaskawa / levels).glob("*.JBI")) == jobs
+    assert "?corner?" in (yaskawa / levels / "ARM.JBI").read_text(encoding="utf-8")
+    assert run_command(f"cellplan verify {levels} --run run {options}", yaskawa)[0] == 0

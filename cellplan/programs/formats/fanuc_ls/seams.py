@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import ceil
 from typing import Final
 
-from cellplan.errors import InputError, NotVerifiedError
+from cellplan.errors import InputError, LineRefusedError
 from cellplan.geometry.arrays import Array
 from cellplan.model.report.exported import ExportFrame, Seam
 from cellplan.model.units import MM
@@ -79,12 +79,10 @@ def _ending(move: Move, share: float) -> str:
     """
     region = min(ceil(MM * move.zone) if share >= LARGEST_SHARE else int(MM * move.zone + ALMOST), MOST_REGION)
     if region < 1 and move.process == "inner" and move.seam is not None:
-        raise NotVerifiedError(
-            [
-                f"task '{move.seam.task}': row {move.row + 1}: a corner in process may be rounded "
-                f"{MM * move.zone:.2g} mm before its point, less than a millimetre: allow more (tolerance), or "
-                "divide the task there"
-            ]
+        raise LineRefusedError(
+            move.seam.task,
+            f": row {move.row + 1}: a corner in process may be rounded {MM * move.zone:.2g} mm before its point, less "
+            "than a millimetre: allow more (tolerance), or divide the task there",
         )
     return f"CR{region}" if region else "FINE"
 
