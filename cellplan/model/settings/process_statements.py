@@ -18,6 +18,9 @@ MOST_STATEMENTS: Final = 8
 LONGEST_STATEMENT: Final = 200  # characters; a line of RAPID or KRL holds more
 WIDEST_MM: Final = 100.0  # no weave and no sensor moves a tool farther from its path
 LARGEST_DATA: Final = 200  # tasks of a cell
+LONGEST_LEAD_S: Final = 0.5  # no valve lags by more, and a RAPID program cannot say more
+LEAD_STEPS: Final = {"abb": 1e-3, "fanuc": 1e-2, "kuka": 1e-3}  # [s] by kinds whose motions switch outputs ahead
+STEP_TOL: Final = 1e-6  # [-] of a time in steps, by rounding
 DATA_SLOT: Final = "{data}"
 STATEMENT_WORDS: Final = "a statement, or a list of statements"
 
@@ -146,6 +149,7 @@ Statements = Annotated[
 ]
 DataName = Annotated[str, StringConstraints(pattern=r"^(?:[A-Za-z][A-Za-z0-9_]{0,31}|[0-9]{1,3})$")]
 Distance = Annotated[Mm, Within(ge=0.0, le=WIDEST_MM)]
+Lead = Annotated[float, Field(ge=0.0, le=LONGEST_LEAD_S)]
 
 
 class ProcessStatementsEntry(Entry):
@@ -169,6 +173,12 @@ class ProcessStatementsEntry(Entry):
         description="Data from which the controller takes the speed of the tool, {data} for those of each task; "
         "absent: the speed of the motion.",
     )
+    on_lead_s: Lead = Field(
+        default=0.0,
+        description="Time by which the outputs of on are switched before the tool is at the first point, as a valve or "
+        "a gun lags; only for the kinds abb, fanuc and kuka.",
+    )
+    off_lead_s: Lead = Field(default=0.0, description="Likewise for the outputs of off and the last point.")
     weave_mm: Distance = Field(
         default=Mm(0.0), description="Amplitude of the controller's own weave, from its centre to its edge."
     )
@@ -178,6 +188,10 @@ class ProcessStatementsEntry(Entry):
         """Statements that begin or end a process, by their keys, in order."""
         key, given = ("on", self.on) if on else ("off", self.off)
         return {key: given} if isinstance(given, str) else {f"{key}[{at}]": text for at, text in enumerate(given)}
+
+    def lead(self, *, on: bool) -> float:
+        """Time in [s] by which outputs that begin or end a process are switched ahead."""
+        return self.on_lead_s if on else self.off_lead_s
 
 
 class ReadStatement(NamedTuple):
@@ -231,6 +245,8 @@ def require_process(process: ProcessStatementsEntry, kind: str) -> None:
         begun, ended = (_read(process, kind, data, on=on) for on in (True, False))
         _require_forms(begun, ended)
         _require_ends(begun, ended)
+        _require_lead(process, kind, begun, on=True)
+        _require_lead(process, kind, ended, on=False)
         _require_inner(process, begun[0], data)
 
 
@@ -275,6 +291,28 @@ def _require_ends(begun: list[ReadStatement], ended: list[ReadStatement]) -> Non
         if not first.is_ended_by(last):
             text = f"expected what ends {first.text!r}, as what is begun last ends first, got {last.text!r}"
             raise rule(text, last.key)
+
+
+def _require_lead(process: ProcessStatementsEntry, kind: str, statements: list[ReadStatement], *, on: bool) -> None:
+    """Only outputs lead, and of kinds whose motions switch outputs ahead, by a time that they can state."""
+    key, lead = f"process.{'on' if on else 'off'}_lead_s", process.lead(on=on)
+    if not lead:
+        return
+    if kind not in LEAD_STEPS:
+        kinds = ", ".join(LEAD_STEPS)
+        cure = "remove it, or let the tool rest at the point (delays of the task's process)"
+        raise rule(f"unexpected key, motions of the kinds {kinds} only switch outputs ahead, got {kind}: {cure}", key)
+    steps = lead / LEAD_STEPS[kind]
+    if abs(steps - round(steps)) > STEP_TOL:
+        raise rule(f"expected a multiple of {LEAD_STEPS[kind]:g} s, as kind {kind} states it, got {lead:g}", key)
+    for statement in statements:
+        if not statement.switch.is_output:
+            text = f"expected outputs only, as nothing else is switched ahead ({key}), got {statement.text!r}"
+            raise rule(text, statement.key)
+    if kind == "fanuc" and len(statements) > 1:
+        raise rule(
+            f"expected one output, as a motion switches one ahead ({key}), got {len(statements)}", statements[1].key
+        )
 
 
 def _lines(statements: list[ReadStatement]) -> Iterator[ReadStatement]:

@@ -6,7 +6,7 @@ a process may go on. What is written for these follows from the cell alone: a re
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import product, zip_longest
 from typing import Final, Literal, NamedTuple, NoReturn
 
 import numpy as np
@@ -33,6 +33,7 @@ class Switches(NamedTuple):
 
 
 NOTHING: Final = Switches()
+ENDS: Final[tuple[tuple[bool, Which], ...]] = ((True, "on"), (False, "off"))
 EVERY_SWITCH: Final = tuple(Switches(*flags) for flags in product((False, True), repeat=3))
 
 
@@ -49,6 +50,7 @@ class Move:
     share: float = 0.0  # share of the shorter neighbouring segment for a move of joints, likewise
     process: Which | None = None  # whether its process goes on or off at its end, or stays on over it
     switches: Switches = NOTHING
+    triggers: tuple[str, ...] = ()  # what it says of outputs that it switches ahead
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +64,8 @@ class Events:
         wait: Text of a wait of some seconds.
         plain: A text without what does not count, as a reader compares it.
         cure: What helps where no zone rounds a corner as little as it must be.
+        trigger: What a motion says of an output that it switches some seconds ahead, which is a statement.
+        setup: What is set up for these before the first move.
     """
 
     frame: ExportFrame
@@ -70,6 +74,8 @@ class Events:
     wait: Callable[[float], str]
     plain: Callable[[str], str] = str.strip
     cure: str = "allow more (tolerance)"
+    trigger: Callable[[float, str], str] = lambda _lead, statement: statement
+    setup: tuple[str, ...] = ()
 
     @property
     def form(self) -> ProcessForm | None:
@@ -98,20 +104,45 @@ class Events:
     def before(self, has_marks: bool) -> tuple[str, ...]:
         """Statements before the first move: the output of the robot is lowered where it waits for others."""
         has_handshake = has_marks and bool(handshake_steps(self.frame, self.robot))
-        return (self.signal(lowering_step(self.frame, self.robot)),) if has_handshake else ()
+        return (*self.setup, *((self.signal(lowering_step(self.frame, self.robot)),) if has_handshake else ()))
+
+    def triggers(self, task: str, on: bool) -> tuple[str, ...]:
+        """What the motion to the first or last point of a task says of the outputs that it switches ahead."""
+        form = self.form
+        texts = () if form is None else form.lines(on, task, ahead=True)
+        return tuple(self.trigger(form.entry.lead(on=on), text) for text in texts if form is not None)
+
+    def triggered(self, task: str | None, texts: Sequence[str], refuse: Refuse) -> Which | None:
+        """Which end of the process of a task a line or an arc has by what it says of outputs, if anything."""
+        stated = tuple(map(self.plain, texts))
+        for on, which in ENDS:
+            if stated and task is not None and stated == tuple(map(self.plain, self.triggers(task, on))):
+                return which
+        if stated:
+            refuse("outputs that are switched ahead as the cell states them, with a line or an arc of a task", texts[0])
+        return None
 
     def knows(self, task: str | None, text: str) -> bool:
         """Whether a statement is one that may stand between moves of a task, or before the first one."""
         texts = {text for switches in EVERY_SWITCH for text in self.texts(task, switches)}
         return self.plain(text) in map(self.plain, texts | {*self.before(True)})
 
-    def read(self, task: str | None, texts: Sequence[str]) -> Switches | None:
-        """What some statements between two moves mean; None where they are no such statements."""
+    def read(self, task: str | None, texts: Sequence[str], process: Which | None) -> Switches | None:
+        """What some statements after a move mean, of whose process it may say something itself; None if nothing."""
         stated = tuple(map(self.plain, texts))
+        said = [(on, which) for on, which in ENDS if self._is_on_motion(task, on)]
         for switches in EVERY_SWITCH:
-            if tuple(map(self.plain, self.texts(task, switches))) == stated and (any(stated) or not any(switches)):
+            is_as_said = all((switches.on if on else switches.off) is (process == which) for on, which in said)
+            if is_as_said and tuple(map(self.plain, self.texts(task, switches))) == stated:
                 return switches
         return None
+
+    def _is_on_motion(self, task: str | None, on: bool) -> bool:
+        """Whether the motion to the first or last point of a task itself says that its process begins or ends."""
+        form = self.form
+        if form is None or task is None:
+            return False
+        return form.is_move or bool(form.suffix(on, task) or form.entry.lead(on=on))
 
 
 def moves_of(job: ExportJob, program: ProgramRows, events: Events) -> tuple[Move, ...]:
@@ -139,6 +170,7 @@ def moves_of(job: ExportJob, program: ProgramRows, events: Events) -> tuple[Move
                 f": row {row + 1}: a corner in process that no zone within its tolerance rounds would be a stop, which "
                 f"ends the process: divide the task there, {events.cure}, or write joints (--moves joints)",
             )
+        switches = Switches(off=before and not after, waits=row in rows.marks, on=after and not before)
         moves.append(
             Move(
                 row=row,
@@ -149,11 +181,26 @@ def moves_of(job: ExportJob, program: ProgramRows, events: Events) -> tuple[Move
                 zone=zone,
                 share=0.0 if on_seam[row] else float(shares[row]),
                 process=which,
-                switches=Switches(off=before and not after, waits=row in rows.marks, on=after and not before),
+                switches=switches,
+                triggers=_triggers(events, seam, switches, is_tool=bool(on_seam[row])),
             )
         )
         middle = None
     return tuple(moves)
+
+
+def _triggers(events: Events, seam: Seam | None, switches: Switches, *, is_tool: bool) -> tuple[str, ...]:
+    """What a move says of outputs that it switches ahead; ``NotVerifiedError`` where it cannot."""
+    form, texts = events.form, list[str]()
+    for on, which in ENDS:
+        if seam is None or form is None or not form.entry.lead(on=on) or not (switches.on if on else switches.off):
+            continue
+        if not is_tool or (on and switches.waits):
+            why = "robots wait for one another" if is_tool else "no line or arc leads (approach_mm)"
+            text = f"task '{seam.task}': {which}_lead_s: no output is switched ahead where its process begins, as {why}"
+            raise NotVerifiedError([f"{text} there: leave it out"])
+        texts += events.triggers(seam.task, on)
+    return tuple(texts)
 
 
 def blocks(moves: Sequence[Move]) -> Iterator[tuple[Seam | None, list[Move]]]:
@@ -226,9 +273,9 @@ def rows_of_moves(
     for move, texts in zip(moves, between[1:], strict=True):
         state.add(move, texts)
     rows = state.finished(moves)
-    if [*map(events.plain, between[0])] != [*map(events.plain, events.before(bool(rows.marks)))]:
-        expected = "before the first move the output of the robot lowered where it waits, and nothing else"
-        (begin or moves[0].refuse)(expected, between[0][0] if between[0] else "none")
+    for needed, got in zip_longest(events.before(bool(rows.marks)), between[0], fillvalue="nothing else"):
+        if events.plain(needed) != events.plain(got):
+            (begin or moves[0].refuse)(f"before the first move {needed}", got)
     return rows
 
 
@@ -245,17 +292,14 @@ class _RowsOfMoves:
 
     def add(self, move: ReadMove, texts: Sequence[str]) -> None:
         """A move, and what stands after it."""
-        switches = self._events.read(move.task, texts)
+        switches = self._events.read(move.task, texts, move.process)
         if switches is None:
-            move.refuse(
-                "after this move, statements of its process and of a handshake, as the cell states them", texts[0]
-            )
+            expected = "after this move, statements of its process and of a handshake, as the cell states them"
+            move.refuse(expected, texts[0] if texts else "none")
         is_on = bool(self._process) and self._process[-1]
-        off, on = switches.off, switches.on
-        if move.process is not None:
-            off, on = off or move.process == "off", on or move.process == "on"
-            if move.process == "inner" and not is_on:
-                move.refuse("a process that goes on before", "one that is off")
+        off, _, on = switches
+        if move.process == "inner" and not is_on:
+            move.refuse("a process that goes on before", "one that is off")
         form = self._events.form
         if is_on and form is not None and form.is_move and move.process is None:
             move.refuse("a motion with its process, which is on", None)

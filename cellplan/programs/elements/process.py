@@ -62,9 +62,10 @@ class ProcessForm:
         """What stands on the motion to the first or last point; empty where nothing does."""
         return "".join(self._texts(StatementForm.SUFFIX, on=on, task=task))
 
-    def lines(self, on: bool, task: str) -> tuple[str, ...]:
-        """Statements after the motion to the first or last point, whole."""
-        return self._texts(StatementForm.LINE, on=on, task=task)
+    def lines(self, on: bool, task: str, *, ahead: bool = False) -> tuple[str, ...]:
+        """Statements after the motion to the first or last point, whole; ``ahead``: outputs that it switches ahead."""
+        leads = self.entry.lead(on=on) > 0.0
+        return self._texts(StatementForm.LINE, on=on, task=task) if leads is ahead else ()
 
     def move(self, which: Literal["on", "inner", "off"], *, circular: bool, slots: Mapping[str, str]) -> str:
         """A motion to a point in process; a circular one passes the point ``via`` of the slots first."""

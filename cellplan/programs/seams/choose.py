@@ -49,17 +49,27 @@ class ToolPath:
     task: Task
     X_PT: Array  # its poses at all rows of a phase in [m], shape (N, 4, 4)
     most: float  # how far a tool may be off its path by rows left out, in [m]
+    least: float = 0.0  # length in [m] that the last line or arc before an end exceeds, as it switches outputs ahead
 
     def pieces(self, ends: Sequence[int]) -> Iterator[Piece]:
         """The longest lines and arcs, one after the other, which end at some rows, increasing."""
-        first = ends[0]
-        for end in ends[1:]:
-            while first < end:
-                piece = max(
-                    (self._longest(first, end, is_arc=is_arc) for is_arc in (False, True)), key=lambda one: one.last
-                )
-                yield piece
-                first = piece.last
+        for first, end in pairwise(ends):
+            pieces = [Piece(first, line(*self.X_PT[[first, first]]))]
+            while pieces[-1].last < end:
+                both = (self._longest(pieces[-1].last, end, is_arc=is_arc) for is_arc in (False, True))
+                pieces.append(max(both, key=lambda one: one.last))
+            if len(pieces) > 2 and pieces[-1].shape.length <= self.least:
+                pieces[-2:] = self._halves(pieces[-3].last, end) or pieces[-2:]
+            yield from pieces[1:]
+
+    def _halves(self, first: int, end: int) -> list[Piece]:
+        """Two lines or arcs of as many rows; none where there are no such ones."""
+        middle = (first + end) // 2
+        trials = [
+            [self._piece(*rows, is_arc=is_arc) for is_arc in (False, True)] for rows in ((first, middle), (middle, end))
+        ]
+        halves = [piece for trial in trials for piece in [next(filter(None, trial), None)] if piece is not None]
+        return halves if len(halves) == len(trials) else []
 
     def stands(self, first: int, last: int) -> bool:
         """Whether the tool rests between two rows."""
@@ -261,7 +271,10 @@ def _path(scene: Scene, every: ProgramRows, task: Task, phase: WorkRows, most: f
     q = {name: rows.q[phase.rows] for name, rows in every.robots.items()}
     start = {name: positions[0] for name, positions in q.items()}
     X_PW = inverse(reference_pose(phase.cell, scene.chains, task, start))
-    return ToolPath(task=task, X_PT=X_PW @ scene.chains[task.robot].tool_poses(q[task.robot]), most=most)
+    control = phase.cell.robot(task.robot).control
+    process = None if control is None else phase.cell.controllers[control.id].process
+    least = 0.0 if process is None or task.feed is None else process.off_lead_s * task.feed
+    return ToolPath(task=task, X_PT=X_PW @ scene.chains[task.robot].tool_poses(q[task.robot]), most=most, least=least)
 
 
 def _shorter(q: Array, places: Sequence[int]) -> dict[int, float]:

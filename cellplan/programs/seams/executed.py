@@ -68,11 +68,10 @@ class SeamExecution:
         return times_of(rows), rows.q
 
     @cached_property
-    def _weave(self) -> float:
-        """How far weave and sensors of its controller move the tool from its path in process, in [m]."""
+    def _form(self) -> ProcessForm | None:
+        """How its controller begins and ends a process."""
         control = self._robot.control
-        form = None if control is None else ProcessForm.of(self._frame.cell.controllers[control.id])
-        return 0.0 if form is None else form.tube
+        return None if control is None else ProcessForm.of(self._frame.cell.controllers[control.id])
 
     def rows(self) -> RobotRows:
         """The rows of joints with their tube; ``NotVerifiedError`` where a seam cannot be executed as it is stated."""
@@ -176,6 +175,8 @@ class SeamExecution:
         _require_reached(self._robot, seam, q, misses, places)
         _require_limits(self._robot, seam, q, places, feed=float(self._rows.feeds[last]), lengths=shares * shape.length)  # type: ignore[index]
         is_on = self._rows.process is not None and bool(self._rows.process[first])
+        if self._form is not None:
+            _require_lead(self._form, seam, self._rows, rows, length=shape.length)
         tube = self._tube(shape, shares, q, X_WP, is_on=is_on)
         return SeamPath(shape=shape, shares=shares, times=times, q=q, tube=tube)
 
@@ -201,7 +202,7 @@ class SeamExecution:
         turned = np.linalg.norm(rotation_vector(X[:, :3, :3] @ np.swapaxes(middle[:, :3, :3], 1, 2)), axis=1)
         rules = shape.rule_margins(shares)
         tool = np.stack([BENT * off, BENT * turned + np.maximum(rules[:-1], rules[1:])], axis=1)
-        judged = tool + np.array([self._weave if is_on else 0.0, 0.0])
+        judged = tool + np.array([self._form.tube if is_on and self._form else 0.0, 0.0])
         return np.concatenate([tool, self._joints_off(judged, q)], axis=1)
 
     def _joints_off(self, tool: Array, q: Array) -> Array:
@@ -250,6 +251,19 @@ def _require_reached(robot: Robot, seam: Seam, q: Array, misses: Array, places: 
             f", {places[step + 1]:.1f} mm along its seam: no continuous motion of the joints follows the line, as "
             f"joint {joint} of '{robot.name}' passes near a singular configuration",
         )
+
+
+def _require_lead(form: ProcessForm, seam: Seam, rows: RobotRows, ends: tuple[int, int], *, length: float) -> None:
+    """A line or an arc takes longer than the time by which it switches an output ahead of its end."""
+    is_on, is_on_behind = (rows.process is not None and bool(rows.process[row]) for row in ends)
+    lead = form.entry.lead(on=is_on_behind) if is_on is not is_on_behind else 0.0
+    feed = np.inf if rows.feeds is None else float(rows.feeds[ends[1]])
+    if lead and lead * feed >= length:
+        text = (
+            f"task '{seam.task}': expected {'on' if is_on_behind else 'off'}_lead_s below {length / feed:.3f}, which "
+        )
+        text += f"the motion to that point takes, {MM * length:.4g} mm at {MM * feed:.4g} mm/s, got {lead:g}"
+        raise NotVerifiedError([text])
 
 
 def _require_limits(robot: Robot, seam: Seam, q: Array, places: Array, *, feed: float, lengths: Array) -> None:

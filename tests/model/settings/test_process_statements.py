@@ -41,8 +41,11 @@ ALLOWED: list[tuple[str, dict[str, Any]]] = [
         },
     ),
     ("fanuc", {"on": "DO[5]=ON", "off": "DO[5]=OFF"}),
+    ("fanuc", {"on": "DO[5]=ON", "off": "DO[5]=OFF", "on_lead_s": 0.29, "off_lead_s": 0.5}),
     ("fanuc", {"on": "CALL GUN(1,2)", "off": "CALL GUN(0)"}),
     ("kuka", {"on": "$OUT[7]=FALSE", "off": "$out[7] = true"}),
+    ("kuka", {"on": ["$OUT[7]=TRUE", "GUN_ON()"], "off": ["GUN_OFF()", "$OUT[7]=FALSE"], "on_lead_s": 0.0}),
+    ("abb", {"on": ["SetDO doA,1", "SetDO doB,1"], "off": ["SetDO doB,0", "SetDO doA,0"], "on_lead_s": 0.137}),
     (
         "kuka",
         {
@@ -269,6 +272,39 @@ def test_what_is_begun_ends_in_the_reverse_order(kind: str, process: dict[str, A
     assert words in message
 
 
+LEADING = {kind: {"on": on, "off": off, "on_lead_s": 0.1} for kind, (on, off) in PAIRS.items()}
+
+
+@pytest.mark.parametrize(
+    ("kind", "process", "key", "words"),
+    [
+        *((kind, LEADING[kind], "on_lead_s", f"ahead, got {kind}: remove it") for kind in ("staubli", "ur", "yaskawa")),
+        ("fanuc", LEADING["fanuc"] | {"on_lead_s": 0.105}, "on_lead_s", "expected a multiple of 0.01 s"),
+        ("kuka", LEADING["kuka"] | {"off_lead_s": 0.0105}, "off_lead_s", "expected a multiple of 0.001 s"),
+        ("fanuc", {"on": "CALL A", "off": "CALL B", "off_lead_s": 0.1}, "off", "(process.off_lead_s), got 'CALL B'"),
+        ("fanuc", {"on": "Arc Start[1]", "off": "Arc End[1]", "on_lead_s": 0.1}, "on", "outputs only"),
+        ("abb", ARC | {"on_lead_s": 0.1}, "on", "expected outputs only, as nothing else is switched ahead"),
+        (
+            "kuka",
+            {"on": ["$OUT[7]=TRUE", "GUN_ON()"], "off": ["GUN_OFF()", "$OUT[7]=FALSE"], "on_lead_s": 0.1},
+            "on[1]",
+            "got 'GUN_ON()'",
+        ),
+        (
+            "fanuc",
+            {"on": ["DO[1]=ON", "DO[2]=ON"], "off": ["DO[2]=OFF", "DO[1]=OFF"], "off_lead_s": 0.1},
+            "off[1]",
+            "expected one output",
+        ),
+    ],
+)
+def test_outputs_lead_where_motions_switch_them(kind: str, process: dict[str, Any], key: str, words: str) -> None:
+    place, message = refusal(kind, process)
+
+    assert place == f"process.{key}"
+    assert words in message
+
+
 @pytest.mark.parametrize(
     ("process", "place"),
     [
@@ -278,6 +314,7 @@ def test_what_is_begun_ends_in_the_reverse_order(kind: str, process: dict[str, A
         ({"on": "a({data})", "off": "b()", "data": {"seam": "1)\nmovel(p1"}}, "process.data.seam"),
         ({"on": "a()", "off": "b()", "feed_in": "weld1\nmovel(p1)"}, "process.feed_in."),
         ({"on": "a()", "off": "b()", "weave_mm": -1.0}, "process.weave_mm"),
+        ({"on": "a()", "off": "b()", "on_lead_s": 0.6}, "process.on_lead_s"),
     ],
 )
 def test_texts_are_bounded(process: dict[str, Any], place: str) -> None:

@@ -46,6 +46,7 @@ def control_findings(
             if name in models:
                 yield from _joints((*path, "id"), entry, models[name], document)
     yield from _process_data(valid, document)
+    yield from _process_delays(valid, document)
     yield from _without_robots(valid, document)
     yield from _stop(valid, document)
 
@@ -172,6 +173,18 @@ def _process_data(valid: ValidEntries, document: YamlDocument) -> Iterator[Findi
         for task in _in_process(name, valid):
             if task not in entry.process.data:
                 yield document.key_finding(path, f"expected data of the task '{task}' too, got none")
+
+
+def _process_delays(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
+    """A tool does not rest at an end of its path for an output that is switched ahead of it."""
+    for name, entry in valid.controllers.items():
+        for task in _in_process(name, valid):
+            for key, on in (("on_delay_s", True), ("off_delay_s", False)):
+                delay = getattr(valid.tasks[task].process, key)
+                if delay and entry.process is not None and entry.process.lead(on=on):
+                    lead = f"controllers.{name}.process.{key.replace('delay', 'lead')}"
+                    text = f"expected 0, as {lead} switches its output ahead, got {delay:g}; state one of both"
+                    yield document.finding(("tasks", task, "process", key), text)
 
 
 def _in_process(controller: str, valid: ValidEntries) -> Iterator[str]:

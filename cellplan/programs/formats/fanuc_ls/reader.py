@@ -13,11 +13,11 @@ from cellplan.model.units import MM
 from cellplan.programs.elements.conventions import CONVENTIONS
 from cellplan.programs.elements.corners import LARGEST_SHARE
 from cellplan.programs.elements.joints import Axes, from_numbers
-from cellplan.programs.elements.paced import Events, ReadMove, Which, rows_of_moves, shorter_lengths
+from cellplan.programs.elements.paced import ENDS, Events, ReadMove, Which, rows_of_moves, shorter_lengths
 from cellplan.programs.formats.fanuc_ls.groups import KIND, MotionGroup, TpProgram
 from cellplan.programs.formats.fanuc_ls.player import MILLISECONDS, TpMotion, TpPlayer
 from cellplan.programs.formats.fanuc_ls.poses import read_configuration
-from cellplan.programs.formats.fanuc_ls.seams import WELD_SPEED, speed_is_held, tp_events
+from cellplan.programs.formats.fanuc_ls.seams import TRIGGER, WELD_SPEED, speed_is_held, tp_events
 
 ARM: Final = 6  # numbers of a pose, as many as of the joints of an arm
 
@@ -77,7 +77,7 @@ def _waiting(player: TpPlayer, group: MotionGroup) -> RobotRows:
     for motion in player.motions:
         move = _read_move(events, group, motion, in_process=is_on)
         moves.append(move)
-        switches = events.read(motion.task, [statement.text for statement in motion.behind])
+        switches = events.read(motion.task, [statement.text for statement in motion.behind], move.process)
         if move.process is not None:
             is_on = move.process == "on"
         elif switches is not None:
@@ -118,20 +118,18 @@ def _read_move(events: Events, group: MotionGroup, motion: TpMotion, *, in_proce
         feed=np.nan if feed is None else feed,
         zone=motion.region / MM,
         share=LARGEST_SHARE if motion.is_passed else 0.0,
-        process=_process(events, motion, in_process=in_process),
+        process=_process(events, motion),
     )
 
 
-def _process(events: Events, motion: TpMotion, *, in_process: bool) -> Which | None:
+def _process(events: Events, motion: TpMotion) -> Which | None:
     """Whether the suffix of a motion begins or ends the process; lines that belong to it stand behind the motion."""
-    form, task = (None, "") if motion.task is None else (events.form, motion.task)
-    if motion.suffix and (form is None or form.suffix(not in_process, task) != motion.suffix):
+    if motion.suffix.startswith(TRIGGER):
+        task = None if motion.feed is None else motion.task
+        return events.triggered(task, [motion.suffix], motion.statement.refuse)
+    for on, which in ENDS if motion.suffix else ():
+        if events.form and motion.task is not None and events.form.suffix(on, motion.task) == motion.suffix:
+            return which
+    if motion.suffix:
         raise motion.statement.error("no such ending of a motion here", motion.suffix)
-    switches = events.read(motion.task, [statement.text for statement in motion.behind])
-    if form is not None and switches is not None:
-        for is_on, has_lines in ((True, switches.on), (False, switches.off)):
-            is_stated = bool(motion.suffix) and is_on is not in_process
-            if form.suffix(is_on, task) and form.lines(is_on, task) and has_lines is not is_stated:
-                expected = " and ".join([form.suffix(is_on, task), *form.lines(is_on, task)])
-                raise motion.statement.error(f"{expected} together, or none")
-    return ("off" if in_process else "on") if motion.suffix else None
+    return None

@@ -19,6 +19,7 @@ from cellplan.programs.formats.fanuc_ls.text import REMARK
 MOST_REGION: Final = 1000  # [mm] of a corner region
 MOST_FEED: Final = 2000.0  # [mm/s]
 WELD_SPEED: Final = "WELD_SPEED"
+TRIGGER: Final = "TB "  # with which a motion says what it does some time before its end
 ALMOST: Final = 1e-9  # [mm] that a region may miss a whole millimetre by
 
 
@@ -30,6 +31,7 @@ def tp_events(frame: ExportFrame, robot: str) -> Events:
         signal=instruction,
         wait=lambda seconds: f"WAIT {fixed(seconds, 2)}(sec)",
         plain=lambda text: "".join(text.split()),
+        trigger=lambda lead, text: f"{TRIGGER}{fixed(lead, 2).removeprefix('0')}sec,{text}",
     )
 
 
@@ -60,7 +62,7 @@ def write_seam(
             poses = [tool_pose(group, part, row, part.rows.X_PT[row], base=number, config=configs[row]) for row in rows]
             points = "\n".join(text.point([pose]) for pose in poses)
             speed, ending = _feed(events, task.name, move), _ending(move, shares[move.row])
-            motion = f"{'L' if move.middle is None else 'C'} {points} {speed} {ending}"
+            motion = " ".join(["L" if move.middle is None else "C", points, speed, ending, *move.triggers])
         else:
             point = text.point([joint_pose(group, part, move.row, number)])
             motion = f"J {point} {part.speeds[move.row]}% FINE"

@@ -45,6 +45,7 @@ def krl_events(frame: ExportFrame, robot: str) -> Events:
         signal=signal_text,
         wait=lambda seconds: f"WAIT SEC {fixed(seconds, WAIT_DECIMALS)}",
         plain=lambda text: "".join(text.upper().split()),
+        trigger=lambda lead, text: f"TRIGGER WHEN DISTANCE=1 DELAY=-{1000.0 * lead:.0f} DO {text}",
     )
 
 
@@ -133,6 +134,7 @@ class SeamWriter:
                 if stated.get(key) != value:
                     stated[key] = value
                     yield value
+            yield from move.triggers
             yield motion
             yield from events.texts(task, move.switches)
 

@@ -12,7 +12,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.report.exported import ExportFrame, ProgramRows, RobotRows
 from cellplan.model.units import MM
 from cellplan.programs.elements.joints import Axes, from_numbers
-from cellplan.programs.elements.paced import Events, ReadMove, rows_of_moves
+from cellplan.programs.elements.paced import Events, ReadMove, Which, rows_of_moves
 from cellplan.programs.elements.pages import read_programs
 from cellplan.programs.elements.text import Statement
 from cellplan.programs.formats.krl.axes import order_of_axes
@@ -42,6 +42,7 @@ _TEXTS: Final = {
     "ADVANCE": r"\$ADVANCE\s*=\s*([0-5])",
     "TOOL": r"\$TOOL\s*=\s*(.*)",
     "BASE": r"\$BASE\s*=\s*(.*)",
+    "TRIGGER": r"TRIGGER\s+(.*)",
     "CALL": r"(\w+)\s*\(\s*\)",
 }
 _PATTERNS: Final = {kind: re.compile(text, re.IGNORECASE) for kind, text in _TEXTS.items()}
@@ -156,6 +157,7 @@ class _Player:
     settings: dict[str, float] = field(default_factory=dict)  # speeds and zones of the routine that is followed
     setup: list[str] = field(default_factory=list)  # what was set before the first motion
     has_base: bool = False  # whether the routine that is followed has set the frame of its task
+    triggers: list[Statement] = field(default_factory=list)  # of outputs that the next motion switches ahead
 
     def enter(self, statement: Statement, routine: str) -> None:
         """Begin the routine of a task."""
@@ -165,6 +167,7 @@ class _Player:
 
     def leave(self) -> None:
         """Go on with the main routine."""
+        _triggered(self, None)
         self.task, self.settings = None, {}
 
     def play(self, statement: Statement) -> None:
@@ -178,6 +181,8 @@ class _Player:
             if not 0.0 < value <= (np.inf if statement.kind in {"VEL_CP", "CDIS"} else 100.0):
                 raise statement.error("a value above 0, of shares up to 100")
             self.settings[statement.kind] = value
+        elif statement.kind == "TRIGGER":
+            self.triggers.append(statement)
         elif statement.kind == "BASE" and self.task is not None:
             self._set_base(statement)
         elif _is_setting(statement):
@@ -235,6 +240,7 @@ class _Player:
 
     def _joint_move(self, statement: Statement) -> ReadMove:
         """A motion of the joints to a point."""
+        _triggered(self, None)
         if "VEL_PTP" not in self.settings:
             raise statement.error("a speed of the joints before")
         values = self._point(statement, 0, self.data.joints)
@@ -255,6 +261,7 @@ class _Player:
             raise statement.error("lines and arcs in the routine of a task, behind $BASE and $VEL.CP")
         if statement.words[2] is not None and "CDIS" not in self.settings:
             raise statement.error("$APO.CDIS to be set before C_DIS")
+        process = _triggered(self, self.task)
         places = (0, 1) if statement.kind == "CIRC" else (0,)
         poses = [self._point(statement, place, self.data.poses) for place in places]
         placed = self.frame.robot(self.robot)
@@ -273,6 +280,7 @@ class _Player:
             configurations=tuple(pose.status_and_turn or () for pose in poses),
             feed=self.settings["VEL_CP"],
             zone=self.settings["CDIS"] / MM if statement.words[2] is not None else 0.0,
+            process=process,
         )
 
     def _point(self, statement: Statement, place: int, points: Mapping[str, Point]) -> Point:
@@ -288,9 +296,16 @@ class _Player:
         for name, line in self.data.lines.items():
             if name not in self.used and not name.startswith(PART.lower()):
                 raise line.error("points that are used", name.upper())
+        _triggered(self, None)
         if not self.moves:
             raise end.error("at least one motion", "none")
         return rows_of_moves(self.events, self.moves, self.between)
+
+
+def _triggered(player: _Player, task: str | None) -> Which | None:
+    """Which end of the process of a task the outputs say that the next motion switches ahead."""
+    triggers, player.triggers = player.triggers, []
+    return player.events.triggered(task, [one.text for one in triggers], triggers[0].refuse) if triggers else None
 
 
 def _is_setting(statement: Statement) -> bool:

@@ -21,7 +21,7 @@ _SHAPES: Final[dict[str, Any]] = {
     "speeddata": ["n"] * 4,
     "zonedata": ["b", *["n"] * 6],
 }
-_STORAGE: Final = {"tooldata": "pers", "wobjdata": "pers", "tasks": "pers", "syncident": "var"}
+_STORAGE: Final = {"tooldata": "pers", "wobjdata": "pers", "tasks": "pers", "syncident": "var", "triggdata": "var"}
 
 
 class RapidData:
@@ -73,9 +73,9 @@ def _examine(frame: ExportFrame, unit: RapidUnit, datum: Datum, part: PartFrame 
         datum.statement.refuse(f"{needed.upper()} {datum.kind}", datum.storage.upper())
     if (datum.count is not None) is not (datum.kind == "tasks"):
         datum.statement.refuse("a number of elements in a list of tasks, and nowhere else")
-    if datum.kind == "syncident":
+    if datum.kind in {"syncident", "triggdata"}:
         if datum.value is not None:
-            datum.statement.refuse("a syncident without a value")
+            datum.statement.refuse(f"a {datum.kind} without a value")
         return
     if datum.value is None:
         datum.statement.refuse(f"a value of {datum.name}")

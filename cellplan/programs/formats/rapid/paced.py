@@ -7,7 +7,7 @@ in the base of the controller. Motions without ``\T`` are those on seams.
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -16,7 +16,17 @@ from cellplan.geometry.transforms import Array, pose, pose_from, quaternion_to_r
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows, Station
 from cellplan.model.units import MM
 from cellplan.programs.elements.handshake import HandshakeStep
-from cellplan.programs.elements.paced import Events, Move, ReadMove, Which, blocks, feed_text, moves_of, rows_of_moves
+from cellplan.programs.elements.paced import (
+    ENDS,
+    Events,
+    Move,
+    ReadMove,
+    Which,
+    blocks,
+    feed_text,
+    moves_of,
+    rows_of_moves,
+)
 from cellplan.programs.elements.text import fixed, safe_names
 from cellplan.programs.formats.rapid.data import RapidData
 from cellplan.programs.formats.rapid.moves import STOP, Place, RapidMove, read_move
@@ -30,19 +40,32 @@ LONGEST_ROUTINE: Final = LONGEST_NAME - 5  # room for the number of a point
 TURN_SPEED: Final = 500  # [deg/s] of a tool, as the speeds of the language have it
 WAIT_DECIMALS: Final = 3
 NEAR: Final = 1.5e-4  # [mm] or [-] rounding of a frame; a quaternion has more decimals
+TRIGGER: Final = "trigg"  # data of outputs that are switched ahead, with their number
 SLOTS: Final = ("point", "via", "speed", "zone", "tool", "frame")
 POSE: Final = re.compile(r"\[\[([^\[\]]*)\],\[([^\[\]]*)\],\[([^\[\]]*)\],\[([^\[\]]*)\]\]")
 
 
 def rapid_events(frame: ExportFrame, unit: RapidUnit) -> Events:
     """What stands between the moves of a robot."""
-    return Events(
+    events = Events(
         frame=frame,
         robot=unit.robot.name,
         signal=signal_text,
         wait=lambda seconds: f"WaitTime {fixed(seconds, WAIT_DECIMALS)};",
         plain=lambda text: plain_statement(text.removesuffix(";")).lower(),
+        trigger=_trigger,
     )
+    tasks = [task.name for task in frame.cell.tasks if task.robot == unit.robot.name]
+    data = dict.fromkeys(text for task in tasks for on in (True, False) for text in events.triggers(task, on))
+    names = {text: f"{TRIGGER}_{number}" for number, text in enumerate(data, start=1)}
+    setup = tuple(f"TriggIO {name},{text};" for text, name in names.items())
+    return replace(events, setup=setup, trigger=lambda lead, statement: names[_trigger(lead, statement)])
+
+
+def _trigger(lead: float, statement: str) -> str:
+    """Data of an output that is switched some seconds before the end of a motion."""
+    signal, state = re.split(" ?, ?", statement.removesuffix(";").partition(" ")[2])
+    return f"{fixed(lead, WAIT_DECIMALS)}\\Time\\DOp:={signal},{state}"
 
 
 def signal_text(step: HandshakeStep) -> str:
@@ -59,7 +82,7 @@ def routine_names(frame: ExportFrame, unit: RapidUnit) -> dict[str, str]:
     """Name of the routine of each task of a robot."""
     tasks = [task.name for task in frame.cell.tasks if task.robot == unit.robot.name]
     form = rapid_events(frame, unit).form
-    reserved = {*RESERVED, *(form.routines if form else ()), unit.module, unit.tool}
+    reserved = {*RESERVED, *(form.routines if form else ()), unit.module, unit.tool, TRIGGER}
     return safe_names(tasks, longest=LONGEST_ROUTINE, reserved=reserved)
 
 
@@ -96,6 +119,8 @@ class PacedWriter:
         for number, station in enumerate(frame.stations.get(name, ())):
             if station.X is not None:
                 yield f"PERS wobjdata {work_object(number)} := {work_object_text(frame, station)};"
+        for number in range(len(rapid_events(frame, self.unit).setup)):
+            yield f"VAR triggdata {TRIGGER}_{number + 1};"
         for feed in sorted({feed_text(move.feed) for move in self.moves if move.is_tool}, key=float):
             yield f"CONST speeddata {speed_name(feed)} := [{feed},{TURN_SPEED},100,20];"
         on_seam = self.rows.on_seam
@@ -148,13 +173,15 @@ class PacedWriter:
         if form is not None and form.is_move and move.process is not None:
             data = form.data(task)
             return form.move(move.process, circular=move.middle is not None, slots={**slots, "data": data})
-        return plain_move(slots, is_arc=move.middle is not None)
+        return plain_move(slots, is_arc=move.middle is not None, triggers=move.triggers)
 
 
-def plain_move(slots: Mapping[str, str], *, is_arc: bool) -> str:
-    """A line or an arc without a process."""
-    points = f"MoveC {slots['via']},{slots['point']}" if is_arc else f"MoveL {slots['point']}"
-    return f"{points},{slots['speed']},{slots['zone']},{slots['tool']}\\WObj:={slots['frame']};"
+def plain_move(slots: Mapping[str, str], *, is_arc: bool, triggers: Sequence[str] = ()) -> str:
+    """A line or an arc without a process, which may switch outputs ahead by names of their data."""
+    points = f"C {slots['via']},{slots['point']}" if is_arc else f"L {slots['point']}"
+    ahead = "".join(f"\\T{number}:={name}" if number > 1 else f",{name}" for number, name in enumerate(triggers, 1))
+    verb, rest = "Trigg" if triggers else "Move", f"{slots['zone']},{slots['tool']}\\WObj:={slots['frame']};"
+    return f"{verb}{points},{slots['speed']}{ahead},{rest}"
 
 
 def zone_text(size: int) -> str:
@@ -226,6 +253,13 @@ class PacedReader:
         texts: list[tuple[str, Which | None, str | None]] = [
             (plain_move(slots, is_arc=is_arc), None, None) for is_arc in (False, True)
         ]
+        texts += [
+            (plain_move(slots, is_arc=is_arc, triggers=triggers), one, task)
+            for task in self._tasks.values()
+            for on, one in ENDS
+            for is_arc in (False, True)
+            if (triggers := self._events.triggers(task, on))
+        ]
         form = self._events.form
         if form is not None and form.is_move:
             which: tuple[Which, ...] = ("on", "inner", "off")
@@ -251,6 +285,8 @@ class PacedReader:
             if task is None:
                 statement.refuse("lines and arcs in the routine of a task")
             self._require_frames(statement, words, task)
+            for name in () if which in {None, "inner"} else self._events.triggers(task, which == "on"):
+                self._data.require(statement, name, "triggdata")
             speed = value_of(self._data.require(statement, words["speed"], "speeddata"))
             points = [self._point(statement, words[slot]) for slot in ("via", "point") if words.get(slot)]
             external = points[-1][2]

@@ -16,7 +16,7 @@ _SPACE: Final = re.compile(r"\s+")
 _AROUND: Final = re.compile(r"\s*([\[\]{}(),:=\\])\s*")
 _DATA: Final = re.compile(r"(task )?(pers|const|var) (\w+) (\w+)(?:\{(\d{1,3})\})?(?::=(.*))?", re.I)
 _TYPES: Final = frozenset(
-    {"tasks", "syncident", "tooldata", "wobjdata", "speeddata", "zonedata", "jointtarget", "robtarget"}
+    {"tasks", "syncident", "triggdata"} | {"tooldata", "wobjdata", "speeddata", "zonedata", "jointtarget", "robtarget"}
 )
 _SHOWN: Final = 60  # characters of a statement in a message
 

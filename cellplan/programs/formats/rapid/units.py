@@ -28,7 +28,8 @@ _WORDS: Final = (
     "endrecord endtest endtrap endwhile error exit false fine for from func goto if inout jointtarget local main mod "
     "module nostepin not noview num or pers proc raise readonly record retry return robtarget speeddata step string "
     "sysmodule task tasks test then to tooldata tool0 trap true trynext undo var viewonly while with wobj0 wobjdata "
-    "xor zonedata syncident load0 setdo waitdi moveabsj moveextj movel movej movec syncmoveon syncmoveoff"
+    "xor zonedata syncident load0 setdo waitdi moveabsj moveextj movel movej movec syncmoveon syncmoveoff triggdata "
+    "triggio triggl triggc"
 )
 
 
