@@ -58,9 +58,54 @@ def test_the_text_puts_the_tool_where_the_joints_do() -> None:
         np.testing.assert_allclose(frame("fPart") @ frame("p_seam", point), X_WT, rtol=0.0, atol=1e-6)
 
 
-def test_a_routine_that_is_no_part_of_the_project_is_refused() -> None:
-    with pytest.raises(InputError, match=r"controllers.box.process.on: expected outputs \(doName=true\) for val3"):
-        VAL3.render(job_with({"on": "call gun:open()", "off": "call gun:close()"}))
+@pytest.mark.parametrize("call", ["call open()", "call gun:open(nPressure)", "call pneumaticGun_of_cell:open()"])
+def test_a_routine_that_is_no_part_of_the_project_is_refused(call: str) -> None:
+    with pytest.raises(InputError, match=r"controllers.box.process: expected outputs \(doName=true\) or routines of"):
+        VAL3.render(job_with({"on": call, "off": "call gun:close()"}))
+
+
+LIBRARIES = {"on": ["call gas:open()", "call arc:on(2, 0.5)"], "off": ["call arc:off()", "call gas:close()"]}
+LIBRARY_CHANGES = {
+    "another routine": ("seam.pgx", "call arc:on", "call arc:off", "signals of the process"),
+    "another number": ("seam.pgx", "arc:on(2, 0.5)", "arc:on(3, 0.5)", "signals of the process"),
+    "another library": ("seam.pgx", "call arc:on", "call gas:on", "signals of the process"),
+    "exchanged": ("seam.pgx", "call gas:open()", "call gas:close()", "as the cell states them"),
+    "not declared": ("alpha.pjx", '    <Library alias="gas" path="gas"/>\n', "", "the libraries arc, gas, got 'arc'"),
+    "one more": (
+        "alpha.pjx",
+        "  </Libraries>",
+        '<Library alias="io" path="io"/></Libraries>',
+        "the libraries arc, gas",
+    ),
+    "elsewhere": ("alpha.pjx", 'path="gas"', 'path="gases"', "a library by the name of its project"),
+}
+
+
+def test_routines_of_libraries_are_declared_in_the_project() -> None:
+    job = job_with(LIBRARIES)
+    files = VAL3.render(job)
+
+    read = VAL3.read(job.frame, files)
+
+    assert list(other_rows(VAL3, job, read)) == []
+    assert re.findall(r'<Library alias="(\w+)" path="(\w+)"/>', files["alpha/alpha.pjx"]) == [
+        ("arc", "arc"),
+        ("gas",) * 2,
+    ]
+    code = files["alpha/seam.pgx"]
+    assert re.findall(r"call .*", code) == [*LIBRARIES["on"], *LIBRARIES["off"]]
+    assert code.count("delay") == 0  # a routine holds its delays
+    assert 'type="dio"' not in files["alpha/alpha.dtx"]
+
+
+@pytest.mark.parametrize("change", LIBRARY_CHANGES)
+def test_a_change_of_a_library_is_noticed(change: str) -> None:
+    job = job_with(LIBRARIES)
+    file, old, new, said = LIBRARY_CHANGES[change]
+    files = VAL3.render(job)
+    assert files[f"alpha/{file}"].count(old) == 1
+
+    assert said in noticed(job, files | {f"alpha/{file}": files[f"alpha/{file}"].replace(old, new)})
 
 
 def noticed(job: ExportJob, files: dict[str, str]) -> str:

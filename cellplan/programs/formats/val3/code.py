@@ -21,6 +21,7 @@ STATEMENTS: Final = {
     "WAIT": rf"wait\s*\(\s*{_FIRST}\s*==\s*(true|false)\s*\)",
     "SET": rf"{_FIRST}\s*=\s*(true|false)",
     "CALL": rf"call\s+({_NAME})\s*\(\s*\)",
+    "LIBRARY": rf"call\s+{_NAME}:{_NAME}\s*\([-0-9., ]*\)",
 }
 _PATTERNS: Final = {kind: re.compile(text, re.ASCII) for kind, text in STATEMENTS.items()}
 _FOR: Final = re.compile(rf"for\s+({_NAME})\s*=\s*([0-9]+)\s+to\s+([0-9]+)(?:\s+step\s+([1-9][0-9]*))?", re.ASCII)

@@ -13,8 +13,9 @@ VERSION: Final = "s7.10.2"  # of the language, as public projects state it
 XML: Final = '<?xml version="1.0" encoding="utf-8"?>'
 
 
-def index_text(project: PagedProgram, programs: Iterable[str]) -> str:
-    """The file that lists programs and data."""
+def index_text(project: PagedProgram, programs: Iterable[str], libraries: Sequence[str] = ()) -> str:
+    """The file that lists programs and data, and libraries by their names, which are those of their projects too."""
+    listed = [f'    <Library alias="{name}" path="{name}"/>' for name in libraries]
     return joined(
         [
             XML,
@@ -27,7 +28,7 @@ def index_text(project: PagedProgram, programs: Iterable[str]) -> str:
             "  <Database>",
             f'    <Data file="{project.name}.dtx"/>',
             "  </Database>",
-            "  <Libraries/>",
+            *(["  <Libraries>", *listed, "  </Libraries>"] if listed else ["  <Libraries/>"]),
             "  <Types/>",
             "</Project>",
         ]

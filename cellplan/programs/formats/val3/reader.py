@@ -59,10 +59,10 @@ class ReadProject:
     programs: Mapping[str, _Val3Program]  # its programs by name
 
 
-def read_project(left: dict[str, str], path: str) -> ReadProject:
-    """Read a project; takes its files out of those that are left."""
+def read_project(left: dict[str, str], path: str, libraries: Sequence[str] = ()) -> ReadProject:
+    """Read a project that uses some libraries; takes its files out of those that are left."""
     file = f"{path}/{path.rpartition('/')[2]}.pjx"
-    listed, data_file = _listed(parse(_taken(left, file), file, "Project", PROJECT_SPACE), path)
+    listed, data_file = _listed(parse(_taken(left, file), file, "Project", PROJECT_SPACE), path, libraries)
     data = read_data(_taken(left, data_file), data_file)
     programs = {name: _program(left, f"{path}/{name}.pgx", name, data) for name in listed}
     return ReadProject(path=path, data=data, programs=programs)
@@ -75,7 +75,7 @@ def _taken(left: dict[str, str], file: str) -> str:
     return left.pop(file)
 
 
-def _listed(project: Val3Element, path: str) -> tuple[list[str], str]:
+def _listed(project: Val3Element, path: str, libraries: Sequence[str]) -> tuple[list[str], str]:
     """Names of the programs that a project lists, and path of its data."""
     project.require()
     project.only("Parameters", "Programs", "Database", "Libraries", "Types")
@@ -83,10 +83,17 @@ def _listed(project: Val3Element, path: str) -> tuple[list[str], str]:
     parameters.require(needed=("version", "stackSize", "millimeterUnit"))
     if parameters.attributes["millimeterUnit"] != "true":
         raise parameters.error("millimetres", parameters.attributes["millimeterUnit"])
-    for empty in project.children:
-        if empty.name in {"Libraries", "Types"}:
-            empty.require()
-            empty.only()
+    used: list[str] = []
+    for child in project.children:
+        if child.name in {"Libraries", "Types"}:
+            child.require()
+            for library in child.only(*["Library"] * (child.name == "Libraries")):
+                library.require(needed=("alias", "path"))
+                if library.attributes["alias"] != library.attributes["path"]:
+                    raise library.error("a library by the name of its project", library.attributes["path"])
+                used.append(library.attributes["alias"])
+    if used != list(libraries):
+        raise project.error(f"the libraries {', '.join(libraries) or 'none'}", ", ".join(used) or "none")
     listed = project.one("Programs")
     names = [_file_name(entry, ".pgx") for entry in listed.only("Program")]
     for name in (START, STOP, *names):
@@ -201,7 +208,7 @@ class _Val3Player:
                 self._stand(statement)
             elif statement.kind == "CALL":
                 self._call(program, statement)
-            elif statement.kind in {"LINE", "ARC", "DELAY"}:
+            elif statement.kind in {"LINE", "ARC", "DELAY", "LIBRARY"}:
                 raise statement.error("motions of the joints, and signals")
             elif statement.kind == "RESET":
                 raise statement.error("resetMotion() in stop alone")

@@ -4,6 +4,7 @@ The points of the program ``NAME`` are the array ``pNAME``, so that they can be 
 the seam is entered by joints, and goes on as it is entered.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -48,6 +49,7 @@ SPEED_DECIMALS: Final = 3  # of a millimetre in a second
 ZONE_DECIMALS: Final = 3  # of a millimetre
 SMALLEST_ZONE: Final = 0.05  # [mm] a smaller zone of joints is a stop; on a seam a stop would end the process
 STAND: Final = "waitEndMove()"  # before signals, which would be set while the robot moves
+CALL: Final = re.compile(r"call (?P<library>[A-Za-z]\w{0,14}):[A-Za-z]\w{0,14}\([-0-9., ]*\)", re.ASCII)
 STAUBLI: Final = CONVENTIONS["staubli"]
 
 
@@ -72,29 +74,44 @@ def _signal_text(step: HandshakeStep, names: Mapping[tuple[bool, str], str]) -> 
 def signal_data(frame: ExportFrame, robot: str) -> dict[str, str]:
     """Links of all signals of a robot by the names of their data: those of its process, and of its handshake."""
     events = val3_events(frame, robot)
-    form, steps = events.form, handshake_steps(frame, robot)
-    tasks = [task.name for task in frame.cell.tasks if task.robot == robot]
-    lines = [line for task in tasks for on in (True, False) for line in (form.lines(on, task) if form else ())]
-    outputs = {name: name for name in (line.partition("=")[0].strip() for line in lines)}
-    return outputs | {name: link(signal, is_input=is_input) for (is_input, signal), name in signal_names(steps).items()}
+    names = [line.partition("=")[0].strip() for line in process_lines(events) if "=" in line]
+    steps = signal_names(handshake_steps(frame, robot))
+    return {name: name for name in names} | {
+        name: link(signal, is_input=is_input) for (is_input, signal), name in steps.items()
+    }
+
+
+def process_lines(events: Events) -> Iterator[str]:
+    """Statements of the process of all tasks of a robot."""
+    for task in events.frame.cell.tasks if events.form else ():
+        if task.robot == events.robot and events.form:
+            yield from (*events.form.lines(True, task.name), *events.form.lines(False, task.name))
+
+
+def libraries(frame: ExportFrame, robot: str) -> list[str]:
+    """Libraries whose routines begin and end the process of a robot, in the order of their names."""
+    calls = (CALL.match(line) for line in process_lines(val3_events(frame, robot)))
+    return sorted({call["library"] for call in calls if call})
 
 
 def require_seams(frame: ExportFrame, robot: str) -> None:
-    """Refuse a part that moves while a tool works, and routines that no project has."""
+    """Refuse a part that moves while a tool works, and routines and data that no project has."""
     for station in frame.stations.get(robot, ()):
         require_rest(robot, station)
-    form = val3_events(frame, robot).form
-    if form is not None and form.routines:
-        raise InputError(
-            f"controllers.{frame.robot(robot).control.id}.process.on: expected outputs (doName=true) for val3, as a "  # type: ignore[union-attr]
-            f"routine is no part of its project, got a call of {min(form.routines)}"
-        )
+    control = frame.robot(robot).control
+    for line in process_lines(val3_events(frame, robot)):
+        if control is not None and "=" not in line and not CALL.fullmatch(line):
+            raise InputError(
+                f"controllers.{control.id}.process: expected outputs (doName=true) or routines of libraries, with "
+                f"numbers (call arc:on(1)), for val3, as its project has no others, got {line}"
+            )
 
 
 def routine_names(frame: ExportFrame, robot: str, project: str) -> dict[str, str]:
     """Name of the program of each task of a robot in a project; that of its points has a letter more."""
     tasks = [task.name for task in frame.cell.tasks if task.robot == robot]
     reserved = {*WORDS, START, STOP, project, *(name for name in DATA.split("|")), *signal_data(frame, robot)}
+    reserved |= {*libraries(frame, robot)}
     return safe_names(tasks, longest=NAME - 2, reserved=reserved)
 
 

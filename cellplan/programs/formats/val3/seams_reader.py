@@ -19,6 +19,7 @@ from cellplan.programs.formats.val3.names import JOINTS, PART, START, STOP, TOOL
 from cellplan.programs.formats.val3.reader import ReadProject, read_project
 from cellplan.programs.formats.val3.seams import (
     STAUBLI,
+    libraries,
     part_of,
     part_values,
     points_name,
@@ -45,7 +46,7 @@ def read_val3_seams(
 
 def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> tuple[RobotRows]:
     """Rows of one robot; takes the files of its project out of those that are left."""
-    return (_SeamPlayer(frame, robot, read_project(left, path)).rows(),)
+    return (_SeamPlayer(frame, robot, read_project(left, path, libraries(frame, robot))).rows(),)
 
 
 class _SeamPlayer:

@@ -32,7 +32,7 @@ from cellplan.programs.formats.val3.names import (
 )
 from cellplan.programs.formats.val3.project_text import array_lines, data_text, index_text, program_text
 from cellplan.programs.formats.val3.reader import read_val3
-from cellplan.programs.formats.val3.seams import SeamWriter, require_seams, routine_names, val3_events
+from cellplan.programs.formats.val3.seams import SeamWriter, libraries, require_seams, routine_names, val3_events
 from cellplan.programs.formats.val3.seams_reader import read_val3_seams
 from cellplan.programs.formats.zones import on_scale, tool_zones
 
@@ -88,7 +88,11 @@ def _with_seams(job: ExportJob, program: ProgramRows, robot: str, path: str) -> 
     programs[START] = program_text(START, [*heads, *seams.programs()[START]])
     texts = {f"{name}.pgx": text for name, text in sorted(programs.items())}
     data = data_text(project.notes, seams.arrays())
-    texts = {f"{project.name}.pjx": index_text(project, texts), f"{project.name}.dtx": data, **texts}
+    texts = {
+        f"{project.name}.pjx": index_text(project, texts, libraries(job.frame, robot)),
+        f"{project.name}.dtx": data,
+        **texts,
+    }
     return {f"{path}/{file}": text for file, text in texts.items()}
 
 
