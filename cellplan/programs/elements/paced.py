@@ -11,7 +11,7 @@ from typing import Final, Literal, NamedTuple, NoReturn
 
 import numpy as np
 
-from cellplan.errors import InputError, LineRefusedError
+from cellplan.errors import InputError, LineRefusedError, NotVerifiedError
 from cellplan.geometry.transforms import Array
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows, Seam
 from cellplan.model.units import MM
