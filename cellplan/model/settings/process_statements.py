@@ -20,6 +20,7 @@ WIDEST_MM: Final = 100.0  # no weave and no sensor moves a tool farther from its
 LARGEST_DATA: Final = 200  # tasks of a cell
 LONGEST_LEAD_S: Final = 0.5  # no valve lags by more, and a RAPID program cannot say more
 LEAD_STEPS: Final = {"abb": 1e-3, "fanuc": 1e-2, "kuka": 1e-3}  # [s] by kinds whose motions switch outputs ahead
+IN_ANY_ORDER: Final = frozenset({"fanuc"})  # kinds whose programs end weave and tracking in the order of their starts
 STEP_TOL: Final = 1e-6  # [-] of a time in steps, by rounding
 DATA_SLOT: Final = "{data}"
 STATEMENT_WORDS: Final = "a statement, or a list of statements"
@@ -161,7 +162,9 @@ class ProcessStatementsEntry(Entry):
     inner: Statement | None = Field(
         default=None, description="Motion to an inner point; required exactly where on and off are motions."
     )
-    off: Statements = Field(description="What ends a process: all that on begins, in the reverse order.")
+    off: Statements = Field(
+        description="What ends a process: all that on begins, in the reverse order; of kind fanuc in any."
+    )
     data: dict[Name, DataName] = Field(
         default={},
         max_length=LARGEST_DATA,
@@ -244,7 +247,7 @@ def require_process(process: ProcessStatementsEntry, kind: str) -> None:
     for data in dict.fromkeys(process.data.values()) or ("",):
         begun, ended = (_read(process, kind, data, on=on) for on in (True, False))
         _require_forms(begun, ended)
-        _require_ends(begun, ended)
+        _require_ends(begun, ended, is_nested=kind not in IN_ANY_ORDER)
         _require_lead(process, kind, begun, on=True)
         _require_lead(process, kind, ended, on=False)
         _require_inner(process, begun[0], data)
@@ -276,21 +279,23 @@ def _require_forms(begun: list[ReadStatement], ended: list[ReadStatement]) -> No
                 raise rule(f"expected {words}, got {len(statements)}", those[-1].key)
 
 
-def _require_ends(begun: list[ReadStatement], ended: list[ReadStatement]) -> None:
-    """All that is begun ends, what is begun last ends first; a statement on a motion has no place in that order."""
+def _require_ends(begun: list[ReadStatement], ended: list[ReadStatement], *, is_nested: bool) -> None:
+    """All that is begun ends, nested: what is begun last first; a statement on a motion has no place in that order."""
     for first in begun:
         if not any(first.is_ended_by(last) for last in ended):
             raise rule(f"expected a statement of off that ends {first.text!r}, got none", first.key)
     for last in ended:
         if not any(first.is_ended_by(last) for first in begun):
             raise rule(f"expected a statement of on that begins what {last.text!r} ends, got none", last.key)
-    lines = list(_lines(begun))[::-1], list(_lines(ended))
     if len(begun) != len(ended):
         raise rule(f"expected {len(begun)} statements, as many as on has, got {len(ended)}", "process.off")
-    for first, last in zip(*lines, strict=True):
-        if not first.is_ended_by(last):
-            text = f"expected what ends {first.text!r}, as what is begun last ends first, got {last.text!r}"
-            raise rule(text, last.key)
+    left = list(_lines(ended))
+    for first in list(_lines(begun))[::-1]:
+        ends = [last for last in (left[:1] if is_nested else left) if first.is_ended_by(last)]
+        if not ends:
+            why = "what is begun last ends first" if is_nested else "each statement ends one"
+            raise rule(f"expected what ends {first.text!r}, as {why}, got {left[0].text!r}", left[0].key)
+        left.remove(ends[0])
 
 
 def _require_lead(process: ProcessStatementsEntry, kind: str, statements: list[ReadStatement], *, on: bool) -> None:

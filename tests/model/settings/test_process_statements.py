@@ -40,6 +40,11 @@ ALLOWED: list[tuple[str, dict[str, Any]]] = [
             "data": {"seam": "3"},
         },
     ),
+    (
+        "fanuc",
+        {"on": ["Weave Sine[6]", "Track TAST[6]", "Arc Start[6]"], "off": ["Arc End[6]", "Weave End", "Track End"]},
+    ),
+    ("fanuc", {"on": ["DO[1]=ON", "CALL A", "DO[2]=ON"], "off": ["DO[1]=OFF", "DO[2]=OFF", "CALL B"]}),
     ("fanuc", {"on": "DO[5]=ON", "off": "DO[5]=OFF"}),
     ("fanuc", {"on": "DO[5]=ON", "off": "DO[5]=OFF", "on_lead_s": 0.29, "off_lead_s": 0.5}),
     ("fanuc", {"on": "CALL GUN(1,2)", "off": "CALL GUN(0)"}),
@@ -246,6 +251,12 @@ def test_an_inner_motion_is_one_of_the_family(text: str) -> None:
         ),
         ("fanuc", {"on": "DO[1]=ON", "off": "DO[1]=ON"}, "on", "ends 'DO[1]=ON'"),
         ("fanuc", {"on": "DO[1]=ON", "off": "DO[2]=OFF"}, "on", "ends 'DO[1]=ON'"),
+        (
+            "fanuc",
+            {"on": ["DO[1]=ON", "DO[1]=ON", "DO[2]=ON"], "off": ["DO[1]=OFF", "DO[2]=OFF", "DO[2]=OFF"]},
+            "off[2]",
+            "ends 'DO[1]=ON', as each statement ends one, got 'DO[2]=OFF'",
+        ),
         (
             "yaskawa",
             {"on": ["ARCON", "WVON WEV#(1)"], "off": ["ARCOF", "WVOF"]},
