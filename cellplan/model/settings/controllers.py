@@ -21,6 +21,7 @@ SLOWEST_MS: Final = 10_000.0  # ten seconds: longer latencies and reactions are 
 LONGEST_BRAKE_S: Final = 60.0  # no arm brakes for a minute
 LAST_SIGNAL: Final = 65_535
 LAST_GROUP: Final = 8
+LAST_MACHINE: Final = 16
 LAST_FRAME: Final = 999
 MOST_DECIMALS: Final = 9
 TASK_LIMIT: Final = 64
@@ -154,7 +155,7 @@ class RobotControlEntry(Entry):
     """Where a robot is connected, and how programs of its controller name things."""
 
     NAMES: ClassVar[Set[str]] = frozenset(
-        {"task", "group", "decimals", "tool_number", "base_number", "frames", "handshake", "step_register"}
+        {"task", "group", "machine", "decimals", "tool_number", "base_number", "frames", "handshake", "step_register"}
     )  # keys that no proof depends on
     id: Name = Field(description="Name of its controller under controllers.")
     task: Identifier | None = setting(None, "Name of its task among the tasks of the controller; only for kind abb.")
@@ -165,6 +166,9 @@ class RobotControlEntry(Entry):
         None,
         "Decimals of a degree or millimetre (of a radian in URScript) in programs of its controller's own language: "
         "fanuc_ls, inform, krl, rapid, urscript and val3; those of the format when absent, and in all other formats.",
+    )
+    machine: Annotated[int, Field(ge=2, le=LAST_MACHINE)] | None = setting(
+        None, "Number of a positioner in MACHINE_DEF of its controller, where 1 is the arm; only for kind kuka."
     )
     cycle_ms: CycleTime | None = setting(
         None, "Cycle at which its controller takes positions; the same as controller_cycle_ms, of which one is enough."

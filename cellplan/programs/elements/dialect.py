@@ -53,6 +53,7 @@ class Dialect:
     shortest_time: float = 0.0  # shortest time in [s] between two rows that targets are known to keep; 0 for no limit
     is_proved: bool = False  # whether that time is documented by the maker, not only known from practice
     has_part_targets: bool = False  # whether rows can be poses of tools on the part while robots move in step
+    has_seams_in_step: bool = False  # or whether tools then move on lines and arcs in its frame
     moves: tuple[Moves, ...] = (Moves.JOINTS,)  # how its programs can move tools where they work
     # configuration of arms as its targets state it, for joints in [rad] or [m], shape (N, n) to (N, k); an
     # ``InputError`` for an arm that has none. None where targets state none.
@@ -60,3 +61,12 @@ class Dialect:
     # what its programs need of the cell, as calls that raise ``InputError`` where it is not there; all of them are made
     # before anything is computed
     demands: Demands = no_demands
+
+    def states_poses(self, frame: ExportFrame) -> bool:
+        """Whether rows of robots in step are stated as poses of their tools on the part, one by one."""
+        return self.has_part_targets and frame.has_part_targets
+
+    def has_seams(self, frame: ExportFrame) -> bool:
+        """Whether tools move on lines and arcs in an export."""
+        in_step = frame.promise is Promise.SYNCHRONISED and frame.moves is not Moves.JOINTS
+        return frame.promise is Promise.PACED or (in_step and self.has_seams_in_step)

@@ -95,7 +95,7 @@ class Events:
                 texts += form.lines(False, task)
                 texts += [self.wait(entry.dwell)] if entry.dwell else []
         if switches.waits:
-            texts += [self.signal(step) for step in handshake_steps(self.frame, self.robot)]
+            texts += [self.signal(step) for step in self._steps]
         if switches.on and task is not None and form is not None:
             texts += form.lines(True, task)
             texts += [] if form.holds_delay or not on_delay else [self.wait(on_delay)]
@@ -103,8 +103,13 @@ class Events:
 
     def before(self, has_marks: bool) -> tuple[str, ...]:
         """Statements before the first move: the output of the robot is lowered where it waits for others."""
-        has_handshake = has_marks and bool(handshake_steps(self.frame, self.robot))
-        return (*self.setup, *((self.signal(lowering_step(self.frame, self.robot)),) if has_handshake else ()))
+        first = [self.signal(lowering_step(self.frame, self.robot))] if has_marks and self._steps else []
+        return (*self.setup, *first)
+
+    @property
+    def _steps(self) -> tuple[HandshakeStep, ...]:
+        """Instructions at a mark; none where robots move in step."""
+        return handshake_steps(self.frame, self.robot) if self.frame.promise.waits else ()
 
     def triggers(self, task: str, on: bool) -> tuple[str, ...]:
         """What the motion to the first or last point of a task says of the outputs that it switches ahead."""

@@ -76,8 +76,11 @@ def prepare(
     moves = choice.moves if no_line is None else Moves.JOINTS
     promised = choose_promise(run, dialect, robots, skew=skew, requested=choice.promise, moves=moves)
     if no_line is not None:
-        promised = replace(promised, reasons=(*promised.reasons, f"not {Promise.PACED}: {no_line}"))
-    frame = frame_of(run, robots, promised.promise, choice)
+        in_step = promised.promise is Promise.SYNCHRONISED
+        choice = replace(choice, moves=moves) if in_step else choice
+        what = "no lines" if in_step else f"not {Promise.PACED}"
+        promised = replace(promised, reasons=(*promised.reasons, f"{what}: {no_line}"))
+    frame = frame_of(run, dialect, robots, promised.promise, choice)
     raise_findings(unmet_demands(run, dialect, frame, choice))
     has_waits = promised.promise.waits and len(run.cell.robots) > 1
     orders = shared.orders(progress) if has_waits else ()
@@ -89,7 +92,7 @@ def prepare(
         return prepare(run, dialect, choice, shared=shared, progress=progress, no_line="; ".join(error.findings))
     is_rounded = dialect.is_rounded and not is_at_cycle(dialect, frame.promise)
     stops, count = stops_left(job) if is_rounded else (0, 0)
-    if stops > FEW_STOPS * count and not choice.is_thinned and frame.promise is not Promise.PACED:
+    if stops > FEW_STOPS * count and not choice.is_thinned and not dialect.has_seams(frame):
         finer = replace(choice, thin_mm=FINER * THIN_MM, thin_deg=FINER * THIN_DEG)
         other, *_ = _job(shared, dialect, finer, frame=frame, orders=orders)
         job, choice = (other, finer) if stops_left(other)[0] < stops else (job, choice)
@@ -111,14 +114,14 @@ def _job(
 ) -> tuple[ExportJob, float, tuple[str, ...]]:
     """The rows of an export, rounded as far as the cell allows it; and by how much they are later."""
     programs, lead = _shaped(shared, dialect, choice, frame=frame, orders=orders)
-    if frame.has_part_targets:
+    if dialect.states_poses(frame):
         programs = with_part_poses(frame, programs)
     job = ExportJob(frame=frame, programs=programs)
     if dialect.is_rounded and not is_at_cycle(dialect, frame.promise):
-        as_poses = frame.has_part_targets or frame.promise is Promise.PACED
+        as_poses = dialect.states_poses(frame) or dialect.has_seams(frame)
         read = None if as_poses else dialect.read(frame, dialect.render(job))
         job = with_rounding(dialect, job, shared=shared, read=read, orders=orders, lead=lead)
-    if frame.promise is not Promise.PACED:
+    if not dialect.has_seams(frame):
         return job, lead, ()
     most = (THIN_MM if choice.thin_mm is None else choice.thin_mm) / MM
     job, by_joints = _with_lines(shared, dialect, job, _with_orders(full_rows(shared.run), orders), most=most)
@@ -134,7 +137,7 @@ def _with_lines(
     """
     frame, essential = job.frame, essential_rows(shared.run)
     by_joints: dict[str, str] = {}
-    for task, holder in on_moving_parts(full, essential):
+    for task, holder in on_moving_parts(full, essential) if frame.promise.waits else ():
         if frame.cell.task(task).robot in frame.robots:
             by_joints[task] = f"'{holder}' moves the part while the tool works"
             if frame.moves is Moves.LINEAR:
@@ -161,17 +164,19 @@ def _moved_by_joints(frame: ExportFrame, by_joints: Mapping[str, str]) -> Iterat
         yield f"task '{task}' moves by joints, at no programmed speed{without}: {reason}"
 
 
-def frame_of(run: AnyRun, robots: Sequence[str], promise: Promise, choice: Choice) -> ExportFrame:
+def frame_of(run: AnyRun, dialect: Dialect, robots: Sequence[str], promise: Promise, choice: Choice) -> ExportFrame:
     """What a reader may know of an export of a run."""
-    return ExportFrame(
+    frame = ExportFrame(
         cell=run.cell,
         robots=tuple(robots),
         programs=tuple(program.name for program in run_programs(run)),
         promise=promise,
         moves=choice.moves,
         split=choice.split,
-        stations=stations(run) if promise is Promise.PACED and not isinstance(run, UnsolvedRun) else {},
     )
+    if isinstance(run, UnsolvedRun) or not dialect.has_seams(frame):
+        return frame
+    return replace(frame, stations=stations(run))
 
 
 def refuse_unfit(run: ReadRun | UnsolvedRun, dialect: Dialect, choice: Choice) -> None:
@@ -197,10 +202,10 @@ def refuse_unfit(run: ReadRun | UnsolvedRun, dialect: Dialect, choice: Choice) -
         unmet += error.findings if isinstance(error, InvalidFileError) else [error]
     except NotVerifiedError as error:
         raise_findings(unmet)
-        frame = frame_of(run, robots, choice.promise or dialect.promises[-1], choice)
+        frame = frame_of(run, dialect, robots, choice.promise or dialect.promises[-1], choice)
         needed = {f"  needed too: {finding}": None for finding in unmet_demands(run, dialect, frame, choice)}
         raise NotVerifiedError([*error.findings, *needed]) from None
-    frame = frame_of(run, robots, promise if unmet else best, choice)
+    frame = frame_of(run, dialect, robots, promise if unmet else best, choice)
     raise_findings([*unmet, *unmet_demands(run, dialect, frame, choice)])
 
 

@@ -90,7 +90,7 @@ def _read(stored: StoredExport, run: VerifiedRun, choice: Choice) -> Any:
     try:
         if not isinstance(dialect, Dialect):
             return dialect.read(run, stored.files)
-        frame = frame_of(run, _robots(stored, run, choice), stored.promise, choice)
+        frame = frame_of(run, dialect, _robots(stored, run, choice), stored.promise, choice)
         return dialect.read(frame, stored.files)
     except KeyError as error:
         raise InputError(f"{stored.folder}: expected a program {error}, got none") from None

@@ -60,7 +60,7 @@ def judged(
     run: VerifiedRun, prepared: PreparedExport, read: tuple[ProgramRows, ...], *, progress: Progress = silent
 ) -> Judgement:
     """Make all checks on what was read; ``NotVerifiedError`` where one fails."""
-    if prepared.job.frame.has_part_targets:
+    if prepared.dialect.states_poses(prepared.job.frame):
         read = joints_of_part_poses(prepared.job.frame, prepared.job.programs, read)
     progress(STAGE, 0.0)
     judgement = judge(run, prepared.dialect, prepared.job, read, lead=prepared.lead, shared=prepared.shared)

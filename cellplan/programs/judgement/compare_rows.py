@@ -134,7 +134,7 @@ def _other_time(written: RobotRows, read: RobotRows) -> str | None:
 def _other_position(dialect: Dialect, job: ExportJob, written: RobotRows, read: RobotRows) -> str | None:
     """The first position that is not as written."""
     robot = job.frame.robot(written.robot)
-    off = _off(robot, dialect, written.q, read.q, is_solved=job.frame.has_part_targets)
+    off = _off(robot, dialect, written.q, read.q, is_solved=dialect.states_poses(job.frame))
     off[written.on_seam] = False
     if not np.any(off):
         return None

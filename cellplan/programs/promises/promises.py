@@ -179,8 +179,9 @@ def _broken_skew(skew: RunSkew | None, pair: ClockPair) -> str:
 def _against_synchronised(export: _Export) -> _Against | None:
     """Why the robots do not pass the same rows at the same time."""
     cell, robots = export.run.cell, export.robots
-    if export.moves is Moves.LINEAR and not export.dialect.has_part_targets:
-        return _Against(f"{export.dialect.name} moves tools by joints where robots move in step")
+    dialect = export.dialect
+    if export.moves is Moves.LINEAR and not (dialect.has_part_targets or dialect.has_seams_in_step):
+        return _Against(f"{dialect.name} moves tools by joints where robots move in step")
     if len(robots) < 2:
         return _Against(f"it takes two robots on one controller, and only '{robots[0]}' is exported")
     names = list(dict.fromkeys(controllers_of(cell, robots).values()))
@@ -216,6 +217,9 @@ def _remarks(export: _Export, promise: Promise) -> Iterator[str]:
                 yield from _unmet(export)
         case Promise.SYNCHRONISED:
             yield "same row at the same time within the blend zones; the controller may take longer than planned"
+            if export.dialect.has_seams_in_step and export.moves is not Moves.JOINTS:
+                yield "on seams the tool moves at the programmed speed on the part, also where the part moves"
+                yield from _processes(export)
             yield from _stays(export)
         case Promise.PACED:
             yield "on seams the tool moves at the programmed speed; times between robots are not kept"

@@ -1,6 +1,6 @@
-"""Seams chosen from a run: few lines and arcs that follow a tool, where the part rests while it works."""
+"""Seams chosen from a run: few lines and arcs that follow a tool on a part that rests, or moves in step with it."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final, NamedTuple
@@ -9,16 +9,15 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, inverse, rotation_vector
 from cellplan.measures.tool_errors import error_lengths, part_poses
-from cellplan.model.cell.cell import Cell
 from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows, Seam
 from cellplan.model.task.task import Frame, Task
 from cellplan.programs.elements.corners import LARGEST_SHARE, switches
+from cellplan.programs.elements.joints import Axes
 from cellplan.programs.rows.part_targets import LEFT_OVER
 from cellplan.programs.rows.rows import EssentialRows, WorkRows, times_of
 from cellplan.programs.rows.thin import bends, chosen_rows
 from cellplan.programs.seams.shapes import STANDS, Shape, arc, corner_cut, line
 from cellplan.runs.plan.program import STILL_TOL
-from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
 MOST_SPIN: Final = np.deg2rad(3.0)  # [rad] by which a tool may leave its orientation in the run where it is free
@@ -29,6 +28,8 @@ SHARE_STEP: Final = 1e-5  # [-] to which the share of a corner is found
 MOST_TURN: Final = np.deg2rad(0.02)  # [rad] that a corner may be cut by
 CORNER_SPIN: Final = np.deg2rad(0.2)  # [rad] likewise, with the turn about the axis of a tool whose spin is free
 SLOWEST: Final = 1e-4  # [m/s] a tool that is slower turns rather than moves
+MOST_HELD: Final = np.deg2rad(0.2)  # [rad] that a joint which moves the part in step may leave its motion in the run
+MOST_HELD_SLIDE: Final = 1e-3  # [m] that a sliding one may, likewise
 TURNS: Final = np.deg2rad(0.1)  # [rad] a tool that stands and turns by less moves on no line
 FEED_STEP: Final = 1e-4  # [m/s] to which speeds are rounded up where no feed is stated
 
@@ -44,12 +45,15 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolPath:
-    """The path of a tool in the frame of a part that rests."""
+    """The path of a tool in the frame of a part."""
 
     task: Task
     X_PT: Array  # its poses at all rows of a phase in [m], shape (N, 4, 4)
     most: float  # how far a tool may be off its path by rows left out, in [m]
     least: float = 0.0  # length in [m] that the last line or arc before an end exceeds, as it switches outputs ahead
+    # joints that move evenly along each line and arc, as shares of what they may be off, shape (N, k); None unless they
+    # move in step
+    held: Array | None = None
 
     def pieces(self, ends: Sequence[int]) -> Iterator[Piece]:
         """The longest lines and arcs, one after the other, which end at some rows, increasing."""
@@ -91,7 +95,7 @@ class ToolPath:
         X = self.X_PT[first : last + 1]
         if not is_arc:
             shape = line(X[0], X[-1])
-            return Piece(last, shape) if self._follows(shape, X) else None
+            return Piece(last, shape) if self._follows(shape, first, last) else None
         travel = np.cumsum(np.linalg.norm(np.diff(X[:, :3, 3], axis=0), axis=1))
         middle = 1 + int(np.searchsorted(travel, 0.5 * travel[-1]))
         circle = arc(X[0], X[middle], X[-1]) if middle < last - first else None
@@ -99,22 +103,25 @@ class ToolPath:
             return None
         through = circle.poses(circle.shares(X[middle, None, :3, 3]))[0]
         circle = arc(X[0], through, X[-1])
-        is_good = circle is not None and self._follows(circle, X)
+        is_good = circle is not None and self._follows(circle, first, last)
         return Piece(last, circle, first + middle, through) if circle is not None and is_good else None
 
-    def _follows(self, shape: Shape, X: Array) -> bool:
-        """Whether a shape keeps a tool as near to its poses in the run, shape (N, 4, 4), as is allowed."""
+    def _follows(self, shape: Shape, first: int, last: int) -> bool:
+        """Whether a shape keeps a tool as near to its poses in the run from row to row as is allowed."""
+        X, held = self.X_PT[first : last + 1], np.zeros((1, 0)) if self.held is None else self.held[first : last + 1]
         shares = shape.shares(X[:, :3, 3])
         if shape.length < STANDS and np.linalg.norm(shape.turn) > TURNS:
             return False
         poses = shape.poses(np.maximum.accumulate(shares))
         errors = error_lengths(poses, X, self.task)
         position, orientation = self.task.tolerance.between
+        uneven = np.abs(held - held[0] - np.maximum.accumulate(shares)[:, None] * (held[-1] - held[0]))
         turns = np.linalg.norm(rotation_vector(poses[:, :3, :3] @ np.swapaxes(X[:, :3, :3], 1, 2)), axis=1)
         return bool(
             errors[:, 0].max() <= min(self.most, LEFT_OVER * position)
             and errors[:, 1].max() + shape.rule_margin <= LEFT_OVER * orientation
             and turns.max() <= MOST_SPIN
+            and uneven.max(initial=0.0) <= 1.0
         )
 
 
@@ -129,6 +136,8 @@ def with_seams(
 ) -> ExportJob:
     """A job whose robots move their tools on lines and arcs, but for some tasks, which have no process then.
 
+    In step these lead over a part that may move.
+
     Args:
         job: Rows of joints, some left out, with their marks and their rounding.
         full: All rows of its programs, with the same marks.
@@ -141,7 +150,12 @@ def with_seams(
         robots = {
             name: _seams_of(scene, job, (rows, every), phases.work, most=most, by_joints=by_joints)
             for name, rows in program.robots.items()
+            if job.frame.promise.waits or Axes.of(job.frame.robot(name)).arm
         }
+        if not job.frame.promise.waits:
+            (arm,) = robots.values()
+            steps = {name: _rows_in_step(scene, rows, arm) for name, rows in every.robots.items()}
+            robots = {name: robots.get(name, steps[name]) for name in program.robots}
         programs.append(replace(program, robots=robots))
     return replace(job, programs=tuple(programs))
 
@@ -157,11 +171,10 @@ def on_moving_parts(full: Sequence[ProgramRows], essential: Sequence[EssentialRo
                         yield task.name, holder.robot
 
 
-def reference_pose(cell: Cell, chains: Mapping[str, ScrewChain], task: Task, q: Mapping[str, Array]) -> Array:
-    """The frame in which a task is given, in the world, shape (4, 4), for joints of all robots, shape (n,)."""
-    if task.relative_to is Frame.WORLD:
-        return np.eye(4)
-    return part_poses(cell, chains, {name: positions[None] for name, positions in q.items()})[0]
+def _rows_in_step(scene: Scene, rows: RobotRows, arm: RobotRows) -> RobotRows:
+    """The rows of a robot that moves in step with an arm: those of the arm."""
+    chosen = np.searchsorted(times_of(rows), times_of(arm))
+    return replace(chosen_rows(scene, rows, chosen), rounding=arm.rounding)
 
 
 @dataclass(kw_only=True, eq=False)
@@ -257,24 +270,32 @@ def _seams_of(
     for phase in work:
         first, last = phase.rows.start, min(phase.rows.stop, len(rows)) - 1
         task = next((task for task in map(phase.cell.task, phase.tasks) if task.robot == thinned.robot), None)
-        if task is None:
+        in_step = not job.frame.promise.waits
+        if task is None and not in_step:
             state.straighten(first, last)
-        elif task.name in by_joints:
+        elif task is not None and task.name in by_joints:
             state.switch_off(first, last)
-        else:
-            state.follow(_path(scene, every, task, phase, most), first, last)
+        elif task is not None:
+            state.follow(_path(scene, every, task, phase, most, in_step=in_step), first, last)
     return state.assembled()
 
 
-def _path(scene: Scene, every: ProgramRows, task: Task, phase: WorkRows, most: float) -> ToolPath:
+def _path(scene: Scene, every: ProgramRows, task: Task, phase: WorkRows, most: float, *, in_step: bool) -> ToolPath:
     """The path of the tool of a task in a phase."""
     q = {name: rows.q[phase.rows] for name, rows in every.robots.items()}
-    start = {name: positions[0] for name, positions in q.items()}
-    X_PW = inverse(reference_pose(phase.cell, scene.chains, task, start))
+    is_on_part = task.relative_to is Frame.PART
+    X_WP = part_poses(phase.cell, scene.chains, q if in_step else {name: one[:1] for name, one in q.items()})
+    X_PW = inverse(X_WP) if is_on_part else np.eye(4)
+    X_PT = X_PW @ scene.chains[task.robot].tool_poses(q[task.robot])
     control = phase.cell.robot(task.robot).control
     process = None if control is None else phase.cell.controllers[control.id].process
     least = 0.0 if process is None or task.feed is None else process.off_lead_s * task.feed
-    return ToolPath(task=task, X_PT=X_PW @ scene.chains[task.robot].tool_poses(q[task.robot]), most=most, least=least)
+    held = [
+        q[name] / [MOST_HELD if joint.is_revolute else MOST_HELD_SLIDE for joint in phase.cell.robot(name).model.joints]
+        for name in every.robots
+        if in_step and name != task.robot
+    ]
+    return ToolPath(task=task, X_PT=X_PT, most=most, least=least, held=np.hstack(held) if held else None)
 
 
 def _shorter(q: Array, places: Sequence[int]) -> dict[int, float]:

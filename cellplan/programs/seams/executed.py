@@ -11,7 +11,7 @@ which a controller's own weave and sensors add where bodies are judged:
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -50,7 +50,10 @@ class SeamPath:
 
 
 class SeamExecution:
-    """The seams of one robot in a program that was read, as its controller executes them."""
+    """The seams of one robot in a program that was read, as its controller executes them.
+
+    Joints are those of the robot, and behind them those of all others that the controller moves in step with it.
+    """
 
     def __init__(
         self, frame: ExportFrame, full: ProgramRows, read: ProgramRows, rows: RobotRows, *, dialect: Dialect
@@ -60,32 +63,31 @@ class SeamExecution:
         self._robot: Robot = frame.robot(rows.robot)
         self._chain = ScrewChain(self._robot)
         self._full, self._read = full, read
-
-    @cached_property
-    def _run_rows(self) -> tuple[Array, Array]:
-        """Times and joints of the robot in the run."""
-        rows = self._full.robots[self._rows.robot]
-        return times_of(rows), rows.q
-
-    @cached_property
-    def _form(self) -> ProcessForm | None:
-        """How its controller begins and ends a process."""
+        others = () if frame.promise.waits else (name for name in read.robots if name != rows.robot)
+        self._names = (rows.robot, *others)
+        counts = [len(frame.robot(name).model.joints) for name in self._names]
+        ends = np.cumsum([0, *counts]).tolist()
+        self._columns = {n: slice(*span) for n, span in zip(self._names, pairwise(ends), strict=True)}
+        self._even = [*Axes.of(self._robot).external, *range(ends[1], ends[-1])]  # joints that follow the path evenly
+        self._q, run_q = (np.hstack([program.robots[name].q for name in self._names]) for program in (read, full))
+        self._run_rows = times_of(full.robots[rows.robot]), run_q
         control = self._robot.control
-        return None if control is None else ProcessForm.of(self._frame.cell.controllers[control.id])
+        self._form = None if control is None else ProcessForm.of(frame.cell.controllers[control.id])
 
-    def rows(self) -> RobotRows:
-        """The rows of joints with their tube; ``NotVerifiedError`` where a seam cannot be executed as it is stated."""
-        if not self._rows.seams:
-            return self._rows
-        rows, count = self._rows, len(self._robot.model.joints)
+    def rows(self) -> dict[str, RobotRows]:
+        """The rows of joints of each robot with their tube.
+
+        ``NotVerifiedError`` where a seam cannot be executed as it is stated.
+        """
+        rows, count = self._rows, self._q.shape[1]
         times, inside = times_of(rows), {seam.first: seam for seam in rows.seams}
-        pieces: list[tuple[Array, Array, Array]] = [(times[:1], rows.q[:1], np.zeros((0, 2 + count)))]
+        pieces: list[tuple[Array, Array, Array]] = [(times[:1], self._q[:1], np.zeros((0, 2 + count)))]
         places = [0]
         row = 1
         while row < len(rows):
             seam = inside.get(row - 1)
             if seam is None:
-                pieces.append((times[row : row + 1], rows.q[row : row + 1], np.zeros((1, 2 + count))))
+                pieces.append((times[row : row + 1], self._q[row : row + 1], np.zeros((1, 2 + count))))
                 places.append(places[-1] + 1)
                 row += 1
                 continue
@@ -96,7 +98,7 @@ class SeamExecution:
             row = seam.last + 1
         return self._executed(pieces, np.array(places))
 
-    def _executed(self, pieces: Sequence[tuple[Array, Array, Array]], places: Array) -> RobotRows:
+    def _executed(self, pieces: Sequence[tuple[Array, Array, Array]], places: Array) -> dict[str, RobotRows]:
         """Rows of all pieces; ``places`` are those of the rows that were read."""
         times, q, tube = (np.concatenate(columns) for columns in zip(*pieces, strict=True))
         rows = self._rows
@@ -108,15 +110,27 @@ class SeamExecution:
         if rows.rounding is not None:
             rounding[places[is_joint]] = rows.rounding[is_joint]
         marks = tuple(places[list(rows.marks)].tolist())
-        return RobotRows(robot=rows.robot, q=q, times=times, process=process, marks=marks, rounding=rounding, tube=tube)
+        robots = {}
+        for name, columns in self._columns.items():
+            is_arm = name == rows.robot
+            parts = [tube[:, :2] if is_arm else np.zeros((len(tube), 2)), tube[:, 2:][:, columns]]
+            robots[name] = RobotRows(
+                robot=name,
+                q=q[:, columns],
+                times=times,
+                process=process & is_arm,
+                marks=marks,
+                rounding=rounding,
+                tube=np.hstack(parts),
+            )
+        return robots
 
     def _seam(self, seam: Seam, q_entry: Array) -> Iterator[tuple[int, SeamPath]]:
         """The lines and arcs of a seam with the rows at which they end, from the joints at which it is entered."""
         rows = self._rows
         if rows.X_PT is None or rows.feeds is None:
             raise InputError(f"robot '{rows.robot}': expected poses and speeds of the seam of '{seam.task}', got none")
-        X_WP = self._part_pose(seam)
-        X, travelled, q = inverse(X_WP) @ self._chain.tool_poses(q_entry[None])[0], 0.0, q_entry
+        X, travelled, q = self._on_part(seam, q_entry[None])[0], 0.0, q_entry
         first = seam.first
         paths: list[tuple[int, SeamPath]] = []
         while first < seam.last:
@@ -128,7 +142,7 @@ class SeamExecution:
                 raise LineRefusedError(
                     seam.task, f": row {last}: no arc of at most {DEG * LARGEST_ARC:.0f} deg leads through it"
                 )
-            path = self._path(seam, (first, last), shape, X_WP, (q, travelled))
+            path = self._path(seam, (first, last), shape, (q, travelled))
             paths.append((last, path))
             for row in range(first + 1, last + 1):
                 share = 1.0 if row == last else float(shape.shares(rows.X_PT[row, None, :3, 3])[0])
@@ -137,23 +151,31 @@ class SeamExecution:
             X, travelled, q, first = end, travelled + shape.length, path.q[-1], last
         yield from self._with_corners(seam, paths)
 
-    def _part_pose(self, seam: Seam) -> Array:
-        """The frame of a seam in the world, as its controller has it, shape (4, 4)."""
+    def _on_part(self, seam: Seam, q: Array) -> Array:
+        """Poses of the tool in the frame of a seam, shape (N, 4, 4), for joints of shape (N, m)."""
+        return inverse(self._part_poses(seam, q)) @ self._chain.tool_poses(q[:, self._columns[self._robot.name]])
+
+    def _part_poses(self, seam: Seam, q: Array) -> Array:
+        """The frame of a seam in the world, as its controller has it, shape (N, 4, 4), for joints of shape (N, m).
+
+        It is one pose for all, shape (4, 4), where no robot that moves in step holds the part.
+        """
         station = self._frame.station(self._rows.robot, seam.task)
         if station.X is None:
             raise InputError(f"task '{seam.task}': expected a part that rests, or moves with a robot of the controller")
         if station.holder is None:
             return controller_base(self._robot) @ station.X
         holder = self._frame.robot(station.holder)
+        X_FP = inverse(on_flange(holder, np.eye(4))) @ station.X
+        if holder.name in self._columns:
+            return ScrewChain(holder).flange_poses(q[:, self._columns[holder.name]]) @ X_FP
         rows = self._read.robots.get(station.holder, self._full.robots[station.holder])
         times = self._full.robots[station.holder].times if rows.times is None else rows.times
         at = 0.5 * float(np.sum(times_of(self._rows)[[seam.first, seam.last]]))
-        q = np.array([np.interp(at, times, column) for column in rows.q.T])  # type: ignore[arg-type]
-        return ScrewChain(holder).flange_poses(q[None])[0] @ inverse(on_flange(holder, np.eye(4))) @ station.X
+        q_holder = np.array([np.interp(at, times, column) for column in rows.q.T])  # type: ignore[arg-type]
+        return ScrewChain(holder).flange_poses(q_holder[None])[0] @ X_FP
 
-    def _path(
-        self, seam: Seam, rows: tuple[int, int], shape: Shape, X_WP: Array, begin: tuple[Array, float]
-    ) -> SeamPath:
+    def _path(self, seam: Seam, rows: tuple[int, int], shape: Shape, begin: tuple[Array, float]) -> SeamPath:
         """One line or arc between two rows, from some joints and a length of the seam."""
         (first, last), (q_entry, travelled) = rows, begin
         ends = times_of(self._rows)[[first, last]]
@@ -161,23 +183,25 @@ class SeamExecution:
         inner = (run_times > ends[0] + STANDS) & (run_times < ends[1] - STANDS)
         times = np.concatenate([ends[:1], run_times[inner], ends[1:]])
         near = np.stack([np.interp(times, run_times, column) for column in run_q.T], axis=1)
-        shares = shape.shares((inverse(X_WP) @ self._chain.tool_poses(near))[:, :3, 3])
+        shares = shape.shares(self._on_part(seam, near)[:, :3, 3])
         shares[0], shares[-1] = 0.0, 1.0
         shares = np.maximum.accumulate(shares)
-        arm, external = list(Axes.of(self._robot).arm), list(Axes.of(self._robot).external)
-        if external and shape.length > STANDS:
-            end_q = self._rows.q[last, external]
-            near[:, external] = q_entry[external] + shares[:, None] * (end_q - q_entry[external])
-        X_WT = X_WP @ shape.poses(shares)
-        q, misses = solved_joints(self._chain, X_WT, near, arm=arm)
+        if self._even and shape.length > STANDS:
+            q_end = self._q[last, self._even]
+            near[:, self._even] = q_entry[self._even] + shares[:, None] * (q_end - q_entry[self._even])
+        X_WT = self._part_poses(seam, near) @ shape.poses(shares)
+        q, columns = near.copy(), self._columns[self._robot.name]
+        q[:, columns], misses = solved_joints(self._chain, X_WT, near[:, columns], arm=list(Axes.of(self._robot).arm))
         q[0] = q_entry
-        places = MM * (travelled + shares * shape.length)
-        _require_reached(self._robot, seam, q, misses, places)
-        _require_limits(self._robot, seam, q, places, feed=float(self._rows.feeds[last]), lengths=shares * shape.length)  # type: ignore[index]
+        places, feed = MM * (travelled + shares * shape.length), float(self._rows.feeds[last])  # type: ignore[index]
+        _require_reached(self._robot, seam, q[:, columns], misses, places)
+        for name, place in self._columns.items():
+            robot, lengths = self._frame.robot(name), shares * shape.length
+            _require_limits(robot, seam, q[:, place], places, feed=feed, lengths=lengths)
         is_on = self._rows.process is not None and bool(self._rows.process[first])
         if self._form is not None:
             _require_lead(self._form, seam, self._rows, rows, length=shape.length)
-        tube = self._tube(shape, shares, q, X_WP, is_on=is_on)
+        tube = self._tube(seam, shape, shares, q, is_on=is_on)
         return SeamPath(shape=shape, shares=shares, times=times, q=q, tube=tube)
 
     def _require_configuration(self, seam: Seam, row: int, q: Array, place: float) -> None:
@@ -185,7 +209,8 @@ class SeamExecution:
         read, function = self._rows.configuration, self._dialect.configuration
         if read is None or function is None:
             return
-        near = [function(self._robot, q + turn)[0] for turn in (-EDGE, 0.0, EDGE)]
+        arm = q[:, self._columns[self._robot.name]]
+        near = [function(self._robot, arm + turn)[0] for turn in (-EDGE, 0.0, EDGE)]
         if not np.all(np.any(np.equal(near, read[row]), axis=0)):
             raise NotVerifiedError(
                 [
@@ -194,10 +219,10 @@ class SeamExecution:
                 ]
             )
 
-    def _tube(self, shape: Shape, shares: Array, q: Array, X_WP: Array, *, is_on: bool) -> Array:
+    def _tube(self, seam: Seam, shape: Shape, shares: Array, q: Array, *, is_on: bool) -> Array:
         """The tube of every step, without corners, shape (M - 1, 2 + n)."""
         middle = shape.poses(0.5 * (shares[:-1] + shares[1:]))
-        X = inverse(X_WP) @ self._chain.tool_poses(0.5 * (q[:-1] + q[1:]))
+        X = self._on_part(seam, 0.5 * (q[:-1] + q[1:]))
         off = np.linalg.norm(X[:, :3, 3] - middle[:, :3, 3], axis=1)
         turned = np.linalg.norm(rotation_vector(X[:, :3, :3] @ np.swapaxes(middle[:, :3, :3], 1, 2)), axis=1)
         rules = shape.rule_margins(shares)
@@ -208,7 +233,8 @@ class SeamExecution:
     def _joints_off(self, tool: Array, q: Array) -> Array:
         """How far joints may be off in each step for what a tool is, shape (M - 1, 2), shape (M - 1, n)."""
         arm, off = list(Axes.of(self._robot).arm), np.zeros((len(tool), q.shape[1]))
-        J_inverse = np.abs(np.linalg.pinv(tip_jacobians(self._chain, q[1:])[:, :, arm]))
+        J = tip_jacobians(self._chain, q[1:, self._columns[self._robot.name]])[:, :, arm]
+        J_inverse = np.abs(np.linalg.pinv(J))
         reach = np.stack([np.linalg.norm(J_inverse[:, :, part], axis=2) for part in (slice(3), slice(3, 6))], axis=2)
         off[:, arm] = RESERVE * np.einsum("mik,mk->mi", reach, tool)
         return off
@@ -226,7 +252,8 @@ class SeamExecution:
             corner = corner_cut(path.shape, other.shape, radius)
             is_free = self._frame.cell.task(seam.task).is_spin_free
             on_tool = np.array([corner.cut, corner.swing if is_free else corner.turn])
-            on_joints = np.array([corner.cut, corner.turn])
+            uneven, moved = self._uneven(seam, path, other, radius)
+            on_joints = np.array([corner.cut, corner.turn]) + moved
             for piece, near in (
                 (place, (1.0 - path.shares) * path.shape.length <= radius),
                 (place + 1, other.shares * other.shape.length <= radius),
@@ -235,8 +262,25 @@ class SeamExecution:
                 q = paths[piece][1].q
                 widened[piece][steps, :2] += on_tool
                 widened[piece][steps, 2:] += self._joints_off(np.tile(on_joints, (len(q) - 1, 1)), q)[steps]
+                widened[piece][steps, 2:] += uneven
         for (row, path), tube in zip(paths, widened, strict=True):
             yield row, replace(path, tube=tube)
+
+    def _uneven(self, seam: Seam, one: SeamPath, other: SeamPath, radius: float) -> tuple[Array, Array]:
+        """By how much joints that move evenly in step may be off at a rounded corner, in [rad] or [m], shape (m,).
+
+        They stay between both motions and the chord where the corner is left, whatever the curve. Beside that, by how
+        much the part may so be moved and turned under the tool in [m] and [rad], shape (2,).
+        """
+        rates = [(path.q[-1] - path.q[0]) / max(path.shape.length, STANDS) for path in (one, other)]
+        off = 0.5 * radius * np.abs(rates[1] - rates[0])
+        off[: self._columns[self._robot.name].stop] = 0.0
+        steps = one.q[-1] + np.vstack([np.zeros(len(off)), np.diag(off)[off > 0.0]])
+        X_WP = np.broadcast_to(self._part_poses(seam, steps), (len(steps), 4, 4))
+        X_WT = self._chain.tool_poses(one.q[-1:, self._columns[self._robot.name]])[0]
+        X = X_WP @ inverse(X_WP[0]) @ X_WT
+        turns = rotation_vector(X[:, :3, :3] @ X_WT[:3, :3].T)
+        return off, np.array([float(np.linalg.norm(v, axis=1).sum()) for v in (X[:, :3, 3] - X_WT[:3, 3], turns)])
 
 
 def _require_reached(robot: Robot, seam: Seam, q: Array, misses: Array, places: Array) -> None:
@@ -314,13 +358,9 @@ def executed_programs(
             for name, rows in recovered.robots.items()
         }
         timed_program = replace(recovered, robots=timed)
-        programs.append(
-            replace(
-                recovered,
-                robots={
-                    name: SeamExecution(job.frame, by_name[recovered.name], timed_program, rows, dialect=dialect).rows()
-                    for name, rows in timed.items()
-                },
-            )
-        )
+        robots = dict(timed)
+        for rows in timed.values():
+            if rows.seams:
+                robots |= SeamExecution(job.frame, by_name[recovered.name], timed_program, rows, dialect=dialect).rows()
+        programs.append(replace(recovered, robots=robots))
     return tuple(programs)

@@ -1,4 +1,4 @@
-"""Arms of two makers that work in turn on a part at rest: lines and arcs are written, read back and judged."""
+"""Lines and arcs of solved cells, on parts at rest and on one that a positioner turns: written, read back, judged."""
 
 import re
 import shutil
@@ -84,3 +84,42 @@ def test_a_bead_is_written_for_other_makers(form: str, tmp_path: Path) -> None:
         assert old in text
         (tmp_path / "p" / name).write_bytes(text.replace(old, new, 1).encode())
         assert run_command(verify, tmp_path)[0] != 0
+
+
+TABLE = BEAD.with_name("ring_on_table.yaml")
+OF_BOTH = {  # changes of the files of an arm and its positioner, each of them noticed on disk
+    "arm.src": [("MACHINE_DEF[2].ROOT", "MACHINE_DEF[3].ROOT"), ("$VEL.CP=0.04", "$VEL.CP=0.05"), ("C_DIS", "")],
+    "arm.dat": [
+        ("PART_FRAME_1={X 0.0", "PART_FRAME_1={X 0.2"),
+        ("E1 -1", "E1 -2"),
+        ("ring_4={X -150.0", "ring_4={X -150.2"),
+    ],
+}
+
+
+@pytest.mark.slow
+def test_a_ring_is_welded_while_a_positioner_turns_the_block(tmp_path: Path) -> None:
+    """The table moves in the seam, whose points are few; programs of joints of the same run have no lines."""
+    shutil.copy(TABLE, tmp_path / "cell.yaml")
+    assert run_command("cellplan solve cell.yaml -o run -q", tmp_path)[0] == 0
+
+    status, out, _ = run_command("cellplan export run --cell cell.yaml --format krl --moves linear -o p", tmp_path)
+
+    assert (status, "  promise: synchronised" in out) == (0, True)
+    source, data = ((tmp_path / "p" / f"arm.{ending}").read_bytes().decode() for ending in ("src", "dat"))
+    seam = source.partition("DEF ring()")[2].split("\r\n")
+    motions = [line.partition(" ")[0] for line in seam if re.match(r"PTP |LIN |CIRC ", line)]
+    assert motions[0] == "PTP"
+    assert motions.count("CIRC") >= 3
+    assert len(motions) <= 12
+    turned = [float(angle) for angle in re.findall(r"E6POS ring_.*?,E1 (\S+?),", data)]
+    assert max(turned) - min(turned) > 3.0
+    verify = "cellplan verify p --run run --cell cell.yaml -q"
+    assert run_command(verify, tmp_path)[0] == 0
+    for name, changes in OF_BOTH.items():
+        text = (tmp_path / "p" / name).read_bytes().decode()
+        for old, new in changes:
+            assert old in text
+            (tmp_path / "p" / name).write_bytes(text.replace(old, new, 1).encode())
+            assert run_command(verify, tmp_path)[0] != 0
+        (tmp_path / "p" / name).write_bytes(text.encode())

@@ -75,6 +75,9 @@ def _of_kind(
             f"{entry.kind}"
         )
         yield document.key_finding((*path, "group"), text)
+    if control.machine is not None and entry.kind != "kuka":
+        text = f"unexpected key, it applies to kind kuka only, and '{control.id}' is of kind {entry.kind}"
+        yield document.key_finding((*path, "machine"), text)
 
 
 def _joints(path: KeyPath, entry: ControllerEntry, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:
@@ -137,12 +140,9 @@ def _frames(
 
 
 def _used_twice(path: KeyPath, control: RobotControlEntry, uses: Uses, document: YamlDocument) -> Iterator[Finding]:
-    """A task, a group, an output or an input of one controller belongs to one robot; an input to one sender."""
-    claims: list[tuple[str, KeyPath, str]] = []
-    if control.task is not None:
-        claims.append(("task", ("task",), control.task))
-    if control.group is not None:
-        claims.append(("group", ("group",), str(control.group)))
+    """What a controller has once belongs to one robot: task, group, machine, output, input; an input to one sender."""
+    numbers = (("task", control.task), ("group", control.group), ("machine", control.machine))
+    claims: list[tuple[str, KeyPath, str]] = [(what, (what,), str(word)) for what, word in numbers if word is not None]
     if control.handshake is not None:
         claims.append(("output", ("handshake", "output"), str(control.handshake.output)))
         for robot, signal in control.handshake.inputs.items():

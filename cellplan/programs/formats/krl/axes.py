@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.model.report.exported import ExportFrame, Promise
+from cellplan.model.report.exported import ExportFrame, Moves, Promise
 from cellplan.programs.elements.frames import require_rest
 from cellplan.programs.elements.joints import Axes
 from cellplan.programs.elements.pages import require_six_axes
@@ -34,24 +34,44 @@ def order_of_axes(frame: ExportFrame, robot: str) -> list[int]:
     return [*axes.arm, *axes.external]
 
 
+def external_axes(frame: ExportFrame, robot: str) -> int:
+    """Number of external axes in the points of a robot's program: those before its arm, then those of other robots."""
+    others = moved_robots(frame, robot)[1:]
+    return len(Axes.of(frame.robot(robot)).external) + sum(len(order_of_axes(frame, name)) for name in others)
+
+
 def demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
     """What these programs need of the cell."""
     for robot in played_robots(frame).robots:
         yield partial(require_numbers, frame, robot)
         yield partial(require_six_axes, frame.robot(robot), external=EXTERNAL, what="KRL")
         yield partial(_require_places, frame, robot)
-        for station in frame.stations.get(robot, ()):
+        in_step = frame.promise is Promise.SYNCHRONISED
+        for station in frame.stations.get(robot, ()) if not in_step else ():
             yield partial(require_rest, robot, station)
-        if frame.promise is Promise.PACED:
+        if frame.promise is Promise.PACED or (in_step and frame.moves is not Moves.JOINTS):
             placed = frame.robot(robot)
             yield partial(status_and_turn, placed, np.zeros((1, len(placed.model.joints))))
+            for grasp in frame.cell.part.held_by[:1]:
+                if grasp.robot in moved_robots(frame, robot)[1:]:
+                    yield partial(machine_of, frame, grasp.robot)
+
+
+def machine_of(frame: ExportFrame, positioner: str) -> int:
+    """Number of a positioner among the machines of its controller; ``InputError`` where the cell states none."""
+    control = frame.robot(positioner).control
+    if control is None or control.machine is None:
+        raise InputError(
+            f"robots.{positioner}.controller.machine: expected its number in MACHINE_DEF of the controller, from 2, as "
+            "it moves the frame of the part, got none"
+        )
+    return control.machine
 
 
 def _require_places(frame: ExportFrame, arm: str) -> None:
     """Refuse more external axes than a point holds."""
-    count = sum(len(order_of_axes(frame, robot)) for robot in moved_robots(frame, arm)[1:])
-    if len(Axes.of(frame.robot(arm)).external) + count > EXTERNAL:
+    count = external_axes(frame, arm)
+    if count > EXTERNAL:
         raise InputError(
-            f"robots.{arm}: expected at most {EXTERNAL} external axes with it on its controller, got "
-            f"{len(Axes.of(frame.robot(arm)).external) + count}"
+            f"robots.{arm}: expected at most {EXTERNAL} external axes with it on its controller, got {count}"
         )

@@ -19,6 +19,7 @@ from cellplan.programs.elements.handshake import HandshakeStep
 from cellplan.programs.elements.paced import Events, Move, blocks
 from cellplan.programs.elements.pages import ENDING, PagedProgram
 from cellplan.programs.elements.text import fixed, safe_names
+from cellplan.programs.formats.krl.axes import external_axes, machine_of
 from cellplan.programs.formats.krl.poses import components, frame_text, pose_text, status_and_turn
 from cellplan.programs.formats.krl.text import MODULES, NAME, POINT, WHOLE
 
@@ -68,10 +69,19 @@ def tool_frame(robot: Robot) -> Array:
     return on_flange(robot, robot.tool.X_FT)
 
 
-def base_text(frame: ExportFrame, robot: str, task: str) -> str:
-    """The frame in which a robot works on a task: by its number, or as it is declared."""
+def part_text(frame: ExportFrame, robot: str, task: str) -> str:
+    """The part that a robot works on in a task: by the number of its frame, or as it is declared."""
     station = frame.station(robot, task)
     return f"BASE_DATA[{station.number}]" if station.number else f"{PART}{frame.stations[robot].index(station) + 1}"
+
+
+def base_texts(frame: ExportFrame, robot: str, task: str) -> list[str]:
+    """What sets the frame in which a robot works on a task: the part, or where a positioner in step moves it."""
+    part, holder = part_text(frame, robot, task), frame.station(robot, task).holder
+    if holder is None:
+        return [f"$BASE={part}"]
+    machine = f"MACHINE_DEF[{machine_of(frame, holder)}]"
+    return [f"$BASE=EK({machine}.ROOT,{machine}.MECH_TYPE,{part})", f"$ACT_EX_AX={external_axes(frame, robot)}"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -119,8 +129,7 @@ class SeamWriter:
                 main += self._block(events, None, moves)
                 continue
             name = self.names[seam.task]
-            base = f"$BASE={base_text(self.frame, self.robot, seam.task)}"
-            routines[name] = [base, *self._block(events, seam.task, moves)]
+            routines[name] = [*base_texts(self.frame, self.robot, seam.task), *self._block(events, seam.task, moves)]
             main.append(f"{name}()")
         return routines
 

@@ -15,13 +15,14 @@ from cellplan.programs.elements.joints import Axes, from_numbers
 from cellplan.programs.elements.paced import Events, ReadMove, Which, rows_of_moves
 from cellplan.programs.elements.pages import read_programs
 from cellplan.programs.elements.text import Statement
-from cellplan.programs.formats.krl.axes import order_of_axes
+from cellplan.programs.formats.krl.axes import external_axes, moved_robots, order_of_axes
 from cellplan.programs.formats.krl.poses import KrlPose, read_pose
 from cellplan.programs.formats.krl.seams import (
     MODES,
     PART,
-    base_text,
+    base_texts,
     krl_events,
+    part_text,
     routine_names,
     tool_frame,
     tool_text,
@@ -43,6 +44,7 @@ _TEXTS: Final = {
     "TOOL": r"\$TOOL\s*=\s*(.*)",
     "BASE": r"\$BASE\s*=\s*(.*)",
     "TRIGGER": r"TRIGGER\s+(.*)",
+    "ACT_EX_AX": r"\$ACT_EX_AX\s*=\s*(.*)",
     "CALL": r"(\w+)\s*\(\s*\)",
 }
 _PATTERNS: Final = {kind: re.compile(text, re.IGNORECASE) for kind, text in _TEXTS.items()}
@@ -60,8 +62,8 @@ def read_seams(
     return read_programs(frame, files, paths, _rows, ending=".src")
 
 
-def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> tuple[RobotRows]:
-    """Rows of a robot; takes its files out of those that are left."""
+def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> tuple[RobotRows, ...]:
+    """Rows of a robot, and of those that move in step with it; takes its files out of those that are left."""
     for file in (f"{path}.src", f"{path}.dat"):
         if file not in left:
             raise InputError(f"{file}: expected a file, got none")
@@ -85,7 +87,7 @@ def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> tu
             player.play(statement)
     for other in routines.values():
         raise other[1].error("routines that are called once", "one that is not")
-    return (player.rows(end),)
+    return player.rows(end)
 
 
 def _routines(lines: Sequence[Statement], file: str) -> dict[str, tuple[list[Statement], Statement]]:
@@ -156,14 +158,16 @@ class _Player:
     used: set[str] = field(default_factory=set)
     settings: dict[str, float] = field(default_factory=dict)  # speeds and zones of the routine that is followed
     setup: list[str] = field(default_factory=list)  # what was set before the first motion
-    has_base: bool = False  # whether the routine that is followed has set the frame of its task
+    # what still has to set the frame of the task whose routine is followed; None before the first of it
+    bases: list[str] | None = None
+    positioners: list[Sequence[float]] = field(default_factory=list)  # their axes at each row
     triggers: list[Statement] = field(default_factory=list)  # of outputs that the next motion switches ahead
 
     def enter(self, statement: Statement, routine: str) -> None:
         """Begin the routine of a task."""
         if routine.upper() not in self.tasks:
             raise statement.error("the routine of a task of the robot", routine)
-        self.task, self.settings, self.has_base = self.tasks[routine.upper()], {}, False
+        self.task, self.settings, self.bases = self.tasks[routine.upper()], {}, None
 
     def leave(self) -> None:
         """Go on with the main routine."""
@@ -183,7 +187,7 @@ class _Player:
             self.settings[statement.kind] = value
         elif statement.kind == "TRIGGER":
             self.triggers.append(statement)
-        elif statement.kind == "BASE" and self.task is not None:
+        elif statement.kind in {"BASE", "ACT_EX_AX"} and self.task is not None:
             self._set_base(statement)
         elif _is_setting(statement):
             self._set(statement)
@@ -202,9 +206,10 @@ class _Player:
         if self.moves or self.task is not None or key.partition("=")[0] in {it.partition("=")[0] for it in self.setup}:
             raise statement.error("each setting once, before the first motion")
         if statement.kind == "TOOL":
-            self._require_frame(
-                statement, tool_text(self.frame.robot(self.robot)), tool_frame(self.frame.robot(self.robot))
-            )
+            placed = self.frame.robot(self.robot)
+            if key != f"$TOOL={tool_text(placed)}".upper():
+                raise statement.error(f"{tool_text(placed)} as the cell states it", key.partition("=")[2])
+            self._require_frame(statement, tool_text(placed), tool_frame(placed))
         elif statement.kind == "BASE" and key != "$BASE=$NULLFRAME":
             raise statement.error("$BASE=$NULLFRAME before the first motion")
         self.setup.append(key)
@@ -218,17 +223,19 @@ class _Player:
 
     def _set_base(self, statement: Statement) -> None:
         """The frame of the task whose routine is followed."""
-        if self.has_base or self.task is None:
+        if self.task is None or self.bases == []:
             raise statement.error("the frame of a task once, in its routine")
-        station = self.frame.station(self.robot, self.task)
-        self._require_frame(statement, base_text(self.frame, self.robot, self.task), station.X)
-        self.has_base = True
+        if self.bases is None:
+            self.bases = base_texts(self.frame, self.robot, self.task)
+        expected = self.bases.pop(0)
+        if re.sub(r"\s+", "", statement.text.upper()) != expected.upper():
+            raise statement.error(f"{expected.removeprefix('$BASE=')} as the cell states it", statement.text)
+        if statement.kind == "BASE":
+            part = part_text(self.frame, self.robot, self.task)
+            self._require_frame(statement, part, self.frame.station(self.robot, self.task).X)
 
     def _require_frame(self, statement: Statement, expected: str, X: Array | None) -> None:
-        """A tool or a part as the cell has it: its number, or the frame that is declared."""
-        got = re.sub(r"\s+", "", str(statement.words[0]).upper())
-        if got != expected.upper():
-            raise statement.error(f"{expected} as the cell states it", got)
+        """A tool or a part as the cell has it: known by its number, or as the frame that is declared."""
         if expected.endswith("]"):
             return
         name = expected.lower()
@@ -245,8 +252,10 @@ class _Player:
             raise statement.error("a speed of the joints before")
         values = self._point(statement, 0, self.data.joints)
         placed, order = self.frame.robot(self.robot), order_of_axes(self.frame, self.robot)
-        if any(values[len(order) :]) or not np.all(np.isfinite(values)):
-            raise statement.error(f"a point with values for the {len(order)} axes of the robot and for no other")
+        count = len(Axes.of(placed).arm) + external_axes(self.frame, self.robot)
+        if any(values[count:]) or not np.all(np.isfinite(values)):
+            raise statement.error(f"a point with values for the {count} axes of the robot and for no other")
+        self.positioners.append(values[len(order) : count])
         written = np.zeros((1, len(order)))
         written[0, order] = values[: len(order)]
         is_rounded = statement.words[1] is not None
@@ -257,7 +266,7 @@ class _Player:
 
     def _tool_move(self, statement: Statement) -> ReadMove:
         """A line or an arc of the tool."""
-        if not self.has_base or self.task is None or "VEL_CP" not in self.settings:
+        if self.bases != [] or self.task is None or "VEL_CP" not in self.settings:
             raise statement.error("lines and arcs in the routine of a task, behind $BASE and $VEL.CP")
         if statement.words[2] is not None and "CDIS" not in self.settings:
             raise statement.error("$APO.CDIS to be set before C_DIS")
@@ -266,8 +275,10 @@ class _Player:
         poses = [self._point(statement, place, self.data.poses) for place in places]
         placed = self.frame.robot(self.robot)
         axes, external = Axes.of(placed), np.array(poses[-1].external)
-        if any(pose.status_and_turn is None for pose in poses) or np.any(external[len(axes.external) :]):
+        first, count = len(axes.external), external_axes(self.frame, self.robot)
+        if any(pose.status_and_turn is None for pose in poses) or np.any(external[count:]):
             raise statement.error("points that are declared as E6POS, with external axes that the robot has")
+        self.positioners += [pose.external[first:count] for pose in poses]
         written = np.zeros((1, len(placed.model.joints)))
         written[0, list(axes.external)] = external[: len(axes.external)]
         q = from_numbers(placed, written)[0]
@@ -291,7 +302,7 @@ class _Player:
         self.used.add(name)
         return points[name]
 
-    def rows(self, end: Statement) -> RobotRows:
+    def rows(self, end: Statement) -> tuple[RobotRows, ...]:
         """All rows, once everything was followed."""
         for name, line in self.data.lines.items():
             if name not in self.used and not name.startswith(PART.lower()):
@@ -299,7 +310,15 @@ class _Player:
         _triggered(self, None)
         if not self.moves:
             raise end.error("at least one motion", "none")
-        return rows_of_moves(self.events, self.moves, self.between)
+        arm = rows_of_moves(self.events, self.moves, self.between)
+        written, robots, first = np.array(self.positioners), [arm], 0
+        for name in moved_robots(self.frame, self.robot)[1:]:
+            order = order_of_axes(self.frame, name)
+            numbers = np.zeros((len(written), len(order)))
+            numbers[:, order] = written[:, first : first + len(order)]
+            robots.append(RobotRows(robot=name, q=from_numbers(self.frame.robot(name), numbers), rounding=arm.rounding))
+            first += len(order)
+        return tuple(robots)
 
 
 def _triggered(player: _Player, task: str | None) -> Which | None:

@@ -45,15 +45,12 @@ def render_krl(job: ExportJob) -> dict[str, str]:
     """
     raise_findings(refusals(*demands(job.frame, 0)))
     paths, files = _paths(job.frame), dict[str, str]()
-    if job.frame.promise is Promise.PACED:
-        for (name, robot), path in paths.items():
-            files |= _with_seams(job, next(it for it in job.programs if it.name == name), robot, path)
-        return files
-    if job.frame.promise is not Promise.SYNCHRONISED:
+    if job.frame.promise is Promise.SEQUENCE_ONLY:
         return render_programs(job, KRL, paths, partial(_files, job.frame))
-    for program in job.programs:
-        for robot in played_robots(job.frame).robots:
-            files |= _in_step(job, program, moved_robots(job.frame, robot), paths[program.name, robot])
+    by_name = {program.name: program for program in job.programs}
+    for (name, robot), path in paths.items():
+        program = _moved_together(job, by_name[name], moved_robots(job.frame, robot), path)
+        files |= _with_seams(job, by_name[name], program) if KRL.has_seams(job.frame) else _modules(program)
     return files
 
 
@@ -62,10 +59,9 @@ def _paths(frame: ExportFrame) -> dict[tuple[str | None, str], str]:
     return program_paths(played_robots(frame), KRL, MODULES)
 
 
-def _with_seams(job: ExportJob, program: ProgramRows, robot: str, path: str) -> dict[str, str]:
+def _with_seams(job: ExportJob, program: ProgramRows, part: PagedProgram) -> dict[str, str]:
     """The files of a robot with seams."""
-    part = paged(job, KRL, program, robot, path)
-    part = replace(part, numbers=part.numbers[:, order_of_axes(job.frame, robot)])
+    path, robot = part.path, part.placed.name
     seams = SeamWriter(
         frame=job.frame,
         program=part,
@@ -87,23 +83,21 @@ def _files(frame: ExportFrame, program: PagedProgram) -> dict[str, str]:
     return _modules(replace(program, numbers=program.numbers[:, order_of_axes(frame, program.placed.name)]))
 
 
-def _in_step(job: ExportJob, program: ProgramRows, robots: Sequence[str], path: str) -> dict[str, str]:
-    """The files of an arm and of positioners that move with it: each row is a point of all their axes."""
+def _moved_together(job: ExportJob, program: ProgramRows, robots: Sequence[str], path: str) -> PagedProgram:
+    """What is written of an arm, and of positioners that move in step: each row is a point of all their axes."""
     parts = [paged(job, KRL, program, robot, path) for robot in robots]
     shares = row_shares(job, program)
     numbers = np.hstack([part.numbers[:, order_of_axes(job.frame, part.placed.name)] for part in parts])
     whole = np.minimum.reduce(
         [np.where(np.any(moves(part.rows), axis=0), shares[part.placed.name], LARGEST_SHARE) for part in parts]
     )
-    return _modules(
-        replace(
-            parts[0],
-            notes=list(dict.fromkeys(chain.from_iterable(part.notes for part in parts))),
-            numbers=numbers,
-            decimals=max(part.decimals for part in parts),
-            speeds=np.max([part.speeds for part in parts], axis=0).tolist(),
-            shares=shares_as_written(whole, numbers, parts[0].pages),
-        )
+    return replace(
+        parts[0],
+        notes=list(dict.fromkeys(chain.from_iterable(part.notes for part in parts))),
+        numbers=numbers,
+        decimals=max(part.decimals for part in parts),
+        speeds=np.max([part.speeds for part in parts], axis=0).tolist(),
+        shares=shares_as_written(whole, numbers, parts[0].pages),
     )
 
 
@@ -170,7 +164,7 @@ def _module(
 
 def _read(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
     """What the files say, by the reader of lines and arcs where there may be some."""
-    return (read_seams if frame.promise is Promise.PACED else read_krl)(frame, files, _paths(frame))
+    return (read_seams if KRL.has_seams(frame) else read_krl)(frame, files, _paths(frame))
 
 
 KRL: Final[Dialect] = Dialect(
@@ -183,6 +177,7 @@ KRL: Final[Dialect] = Dialect(
     moves=tuple(Moves),
     configuration=status_and_turn,
     most_arms=1,
+    has_seams_in_step=True,
     kinds=frozenset({"kuka"}),
     is_thinned=True,
     is_rounded=True,
