@@ -125,3 +125,20 @@ def test_frames_of_the_part_have_numbers_of_their_kind(connected: Load, kind: st
 def test_what_is_no_frame_is_refused_by_its_key(connected: Load, key: str, value: str) -> None:
     with pytest.raises(InvalidFileError, match=rf"^c:6: robots\.holder\.controller\.{key}"):
         connected(("{id: c1, handshake: ", f"{{id: c1, {key}: {value}, handshake: "))
+
+
+@pytest.mark.parametrize(
+    ("kind", "number", "words"),
+    [
+        ("kuka", 1, "expected a number of at least 2, got 1"),
+        ("ur", 2, "unexpected key, it applies to kind kuka only, and 'c1' is of kind ur"),
+    ],
+)
+def test_only_kuka_numbers_its_machines_and_from_two(connected: Load, kind: str, number: int, words: str) -> None:
+    machine = ("{id: c1,", f"{{id: c1, machine: {number},")
+    assert connected(("{id: c1,", "{id: c1, machine: 2,")).robot("holder").control.machine == 2
+
+    with pytest.raises(InvalidFileError) as caught:
+        connected(("kind: kuka", f"kind: {kind}"), machine)
+
+    assert f"robots.holder.controller.machine: {words}" in str(caught.value)

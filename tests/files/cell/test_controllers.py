@@ -207,17 +207,6 @@ def test_several_robots_share_a_controller_with_tasks_and_signals_of_their_own(c
             "fanuc and yaskawa only, and 'c1' is of kind kuka",
         ),
         (
-            "task: T_ROB1",
-            "task: T_ROB1, machine: 2",
-            "c:13: robots.worker.controller.machine: unexpected key, it applies to kind kuka only, and 'c2' is of kind "
-            "abb",
-        ),
-        (
-            "{id: c1",
-            "{id: c1, machine: 1",
-            "c:6: robots.holder.controller.machine: expected a number of at least 2, got 1",
-        ),
-        (
             "decimals: 3",
             "decimals: 10",
             "c:13: robots.worker.controller.decimals: expected a number of at most 9, got 10",
