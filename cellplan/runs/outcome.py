@@ -5,6 +5,7 @@ from pathlib import Path
 
 from cellplan.errors import InputError, NoSolutionError, StudyStoppedError
 from cellplan.model.cell.cell import Cell
+from cellplan.report.record.figures import KEY, figures_of
 from cellplan.runs.overrides import require_task
 from cellplan.runs.solution import Solution
 from cellplan.runs.solve import solve
@@ -14,11 +15,11 @@ from cellplan.study.trial import TrialOutcome, TrialStatus
 
 def solved_outcome(
     read: Callable[[], Cell],
-    figures: Callable[[Solution], Mapping[str, object]],
     *,
     file: Path,
     task: str | None = None,
     folder: Path | None = None,
+    figures: Callable[[Solution], Mapping[str, object]] | None = None,
 ) -> TrialOutcome:
     """Solve one variant; what is wrong with it becomes its reason.
 
@@ -26,6 +27,7 @@ def solved_outcome(
         file: The cell file; reasons name it without its folder.
         task: Name of the only task to work on; None for all.
         folder: Run folder to be written; None for none.
+        figures: Gives the figures of the outcome; None for the key figures of the program.
 
     Raises:
         StudyStoppedError: The run folder cannot be written.
@@ -45,4 +47,5 @@ def solved_outcome(
             raise StudyStoppedError(str(error)) from error
     failed = [check.message for run in solution.runs for check in run.report.checks if not check.passed]
     status = TrialStatus.FAILED if failed else TrialStatus.PASSED
-    return TrialOutcome(status=status, reason=failed[0] if failed else "", figures=figures(solution))
+    key = figures_of([run.report for run in solution.runs]).record(KEY) if figures is None else figures(solution)
+    return TrialOutcome(status=status, reason=failed[0] if failed else "", figures=key)

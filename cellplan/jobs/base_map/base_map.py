@@ -31,10 +31,8 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.units import DEG, MM
 from cellplan.report.plots.rendering import require_formats
 from cellplan.report.record.common import Record, as_json, number
-from cellplan.report.record.figures import KEY, figures_of
 from cellplan.runs.outcome import solved_outcome
 from cellplan.runs.plan.rounded import rounded
-from cellplan.runs.solution import Solution
 from cellplan.runs.write_run import versions
 from cellplan.search.base_map.verdicts import PlaceVerdict, best_first
 from cellplan.study.folder import RESULT, SCHEMA, write_results
@@ -167,7 +165,7 @@ def finished_record(
     certified = []
     for done, values in enumerate(settings[:certify]):
         progress("certifying", done / certify)
-        outcome = solved_outcome(partial(cell.with_values, values), _figures, file=Path(cell.origin.file))
+        outcome = solved_outcome(partial(cell.with_values, values), file=Path(cell.origin.file))
         certified.append({"status": str(outcome.status), "reason": outcome.reason, "figures": dict(outcome.figures)})
     return map_record(
         ready.jobs,
@@ -231,8 +229,3 @@ def _written_start(cell: Cell, robot: Robot, start: Array) -> dict[str, Any]:
     others = tuple(started if other.name == robot.name else other for other in cell.robots)
     entry = written_document(replace(cell, robots=others))["robots"][robot.name]
     return {key: entry[key] for key in ("start", "start_deg") if key in entry}
-
-
-def _figures(solution: Solution) -> dict[str, Any]:
-    """Key figures of a certified place."""
-    return figures_of([run.report for run in solution.runs]).record(KEY)

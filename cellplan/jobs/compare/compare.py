@@ -145,7 +145,7 @@ def evaluate_subject(job: CompareJob, variant: Variant) -> TrialOutcome:
             given = with_overrides(load_cell(path, allow_dirs=job.allow_dirs), job.settings)
             return given.with_values(values) if values else given
 
-        return solved_outcome(cell, _solved_figures, file=path, task=job.task, folder=folder)
+        return solved_outcome(cell, figures=_solved_figures, file=path, task=job.task, folder=folder)
 
     whole = solved(variant.values if is_mode else {})
     if whole.status is not TrialStatus.NO_SOLUTION or PROGRAM not in variant.values:

@@ -15,10 +15,8 @@ from cellplan.jobs.sweep.result import study_files, study_record
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.report.plots.rendering import require_formats
-from cellplan.report.record.figures import KEY, figures_of
 from cellplan.runs.outcome import solved_outcome
 from cellplan.runs.overrides import require_task, with_overrides
-from cellplan.runs.solution import Solution
 from cellplan.runs.write_run import versions
 from cellplan.study.bundle import Bundle
 from cellplan.study.folder import run_folder, write_results
@@ -117,16 +115,10 @@ def evaluate_variant(job: SweepJob, variant: Variant) -> TrialOutcome:
     """Solve one variant; what is wrong with it becomes its reason."""
     return solved_outcome(
         lambda: _base_cell(job).with_values(variant.values),
-        _figures,
         file=job.cell,
         task=job.task,
         folder=None if job.runs is None else run_folder(job.runs, variant.number),
     )
-
-
-def _figures(solution: Solution) -> dict[str, Any]:
-    """Key figures of a solved variant."""
-    return figures_of([run.report for run in solution.runs]).record(KEY)
 
 
 @lru_cache(maxsize=1)
