@@ -73,7 +73,8 @@ def _unavoidable_words(search: StartSearch, contact: StartContact, *others: Star
     """What to say of a contact that no configuration of a robot avoids, and of the same of other robots."""
     cell, (body, other) = search.cell, contact.bodies
     also = ", and wherever else its joints may be" if contact.is_everywhere else ""
-    which = "the only one" if contact.of == 1 else f"all {contact.of}"
+    which, goal = "the only one" if contact.of == 1 else f"all {contact.of}", _goal_words(search, contact.robot)
+    arrives = "were tried" if goal is None else f"reach {goal}"
     besides = [
         f"'{contact.bodies[0].name}' touches '{contact.bodies[1].name}' in all {contact.of} of its own"
         for contact in others
@@ -81,7 +82,7 @@ def _unavoidable_words(search: StartSearch, contact: StartContact, *others: Star
     more = f"; besides, {', '.join(besides[: SHOWN - 1])}" if besides else ""
     return (
         f"{start_place(cell, cell.robot(contact.robot))}: no start configuration of '{contact.robot}' is free of "
-        f"contact: '{body.name}' touches '{other.name}' in {which} that {_arrives(search, contact.robot)}{also}: "
+        f"contact: '{body.name}' touches '{other.name}' in {which} that {arrives}{also}: "
         f"{doubt_about(cell, cell.robot(contact.robot)) or _cure(contact)}{more}"
     )
 
@@ -119,16 +120,6 @@ def _frequent_words(search: StartSearch) -> str:
     )
 
 
-def _arrives(search: StartSearch, name: str) -> str:
-    """What a robot's configurations do, as the end of a sentence."""
-    relation = next((relation for relation in search.cell.relations if relation.robot == name), None)
-    if relation is None:
-        return "were tried"
-    return (
-        "reach its grasp on the part" if isinstance(relation, Grasp) else f"reach the start of task '{relation.name}'"
-    )
-
-
 def _unreached_words(search: StartSearch, holder_count: int) -> str:
     """What to say of a robot that does not come to where it is desired."""
     cell, failures = search.cell, search.failures
@@ -141,7 +132,7 @@ def _unreached_words(search: StartSearch, holder_count: int) -> str:
     tried = f"{SEEDS} attempts of the inverse kinematics"
     if search.is_holder_open and name not in cell.positioners[:1]:
         tried = f"{holder_count} configuration(s) of the positioner, {SEEDS_PER_HOLDER} attempts for each"
-    desired = f"the tool of '{name}' to {_goal_words(search, name)}"
+    desired = f"the tool of '{name}' to {_goal_words(search, name) or 'where the part meets the robots that stand'}"
     doubt = doubt_about(cell, robot)
     return (
         f"{start_place(cell, robot)}: no configuration within the joint limits brings {desired} ({tried}): "
@@ -149,11 +140,11 @@ def _unreached_words(search: StartSearch, holder_count: int) -> str:
     )
 
 
-def _goal_words(search: StartSearch, name: str) -> str:
-    """Where a robot's tool is desired at the start."""
+def _goal_words(search: StartSearch, name: str) -> str | None:
+    """Where a robot's tool is desired at the start; None for a robot without a task or a grasp."""
     relation = next((relation for relation in search.cell.relations if relation.robot == name), None)
     if relation is None:
-        return "where the part meets the robots that stand"
+        return None
     return "its grasp on the part" if isinstance(relation, Grasp) else f"the start of task '{relation.name}'"
 
 
