@@ -9,6 +9,7 @@ from cellplan.model.robot.robot import RobotModel
 from cellplan.model.robot.robot_description import DescribedJoint, DescribedMimic, RobotDescription
 from cellplan.model.units import DEG, MM, joint_unit
 from cellplan.report.record.sections.rests_on import zero_record
+from cellplan.report.text.columns import aligned
 
 # Record
 
@@ -176,8 +177,4 @@ def _link_row(link: dict[str, Any]) -> tuple[str, ...]:
 
 def _block(head: str, rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Rows below their head, in columns; nothing where there are none."""
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))] if rows else []
-    texts = [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True) if width).rstrip() for row in rows
-    ]
-    return [f"  {head}", *(f"    {text}" for text in texts)] if rows else []
+    return [f"  {head}", *aligned(rows, "    ")] if rows else []
