@@ -55,10 +55,6 @@ def _described(model: RobotModel, written: str) -> RobotDescription:
     return RobotDescription(
         name=model.name,
         source=model.source,
-        base="",
-        flange="",
-        is_usual=True,
-        flanges=(),
         X_BF=model.X_BF,
         joints=tuple(
             DescribedJoint(
@@ -66,8 +62,6 @@ def _described(model: RobotModel, written: str) -> RobotDescription:
             )
             for joint in model.joints
         ),
-        mimics=(),
-        locked={},
         links=tuple(_links(model)),
         cell_lines=cell_lines(Path(written).stem, {"model": written}),
         model=model,

@@ -1,6 +1,6 @@
 """What a robot's file says, before a cell adds what is missing: flanges, joints, bodies and their size."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.robot.robot import RobotModel
@@ -59,15 +59,15 @@ class RobotDescription:
 
     name: str  # name of the model
     source: str  # where the figures come from
-    base: str  # link that is placed in the cell; empty where it has no name
-    flange: str  # link that is taken as the flange
-    is_usual: bool  # whether this flange is taken where a cell names none
-    flanges: tuple[FlangeChoice, ...]  # all links that may be the flange; none where there is no choice
+    base: str = ""  # link that is placed in the cell; empty where it has no name
+    flange: str = ""  # link that is taken as the flange
+    is_usual: bool = True  # whether this flange is taken where a cell names none
+    flanges: tuple[FlangeChoice, ...] = ()  # all links that may be the flange; none where there is no choice
     X_BF: Array  # pose of the flange in the base while all joints read zero
     joints: tuple[DescribedJoint, ...]  # the driven joints
-    mimics: tuple[DescribedMimic, ...]  # joints that follow others
+    mimics: tuple[DescribedMimic, ...] = ()  # joints that follow others
     # joints off the chain with zero, or the nearest position within their limits, as a cell states them
-    locked: dict[str, float]
+    locked: dict[str, float] = field(default_factory=dict)
     links: tuple[LinkSize, ...]  # the links that have bodies
     cell_lines: str  # what to write into a cell, as YAML
     model: RobotModel | None  # the robot; None where limits are missing

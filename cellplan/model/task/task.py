@@ -220,19 +220,19 @@ class Task:
     name: str
     robot: str
     path: PathSpec
-    project: Array | None
-    plane_offset: float
-    tool_axis: Array | None
+    project: Array | None = None
+    plane_offset: float = 0.0
+    tool_axis: Array | None = None
     tool_x: Array
-    turn: float
+    turn: float = 0.0
     axes: tuple[int, ...]
-    is_spin_free: bool
+    is_spin_free: bool = False
     tolerance: ToleranceEntry
-    start: float
+    start: float = 0.0
     duration: float | None
-    feed: float | None
+    feed: float | None = None
     time_law: TimeLaw
-    blend: float | None
+    blend: float | None = None
     settle: float = 0.0
     repeat: int = 1
     approach: StraightMove | None = None
