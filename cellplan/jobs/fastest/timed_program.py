@@ -100,7 +100,7 @@ class TimedProgram:
             solution=solution,
             scene=scene,
             bindings=tuple(_binding(run, is_retimed=law in RETIMED) for run in scaled),
-            load=max(_slower(scene, limits, q) for limits, q in rows),
+            load=max(replace(limits, scene=scene, paths=()).slower(np.zeros(len(q)), q) for limits, q in rows),
         )
 
     def load_of(self, robot: str) -> float:
@@ -148,11 +148,6 @@ def _rows(run: Run) -> tuple[RowLimits, Array]:
     """Limits and written joint positions of a phase."""
     names = [robot.name for robot in run.cell.robots]
     return row_limits(run.scene, run.schedule), np.concatenate([run.report.q[name] for name in names], axis=1)
-
-
-def _slower(scene: Scene, limits: RowLimits, q: Array) -> float:
-    """Factor of time that the limits of one phase ask for; feeds do not, they are scaled."""
-    return replace(limits, scene=scene, paths=()).slower(np.zeros(len(q)), q)
 
 
 def _binding(run: Run, *, is_retimed: bool) -> Binding:

@@ -1,6 +1,6 @@
 """Write the floor plan of a run, or of a cell that was not solved, as SVG or DXF."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
@@ -139,7 +139,7 @@ def _of_run(request: FloorPlanRequest) -> FloorPlan:
     ).cell
     pendants = pendant_frames(cell, stations(read_run(stored, cell))) if request.frames else ()
     read = [stored_series(stored, place, cell) for place in stored.records]
-    motions = [_by_robot(cell, q) for _, q in read]
+    motions = [{robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots} for _, q in read]
     start = {name: q[0] for name, q in motions[0].items()}
     whole = sum(float(times[-1]) for times, _ in read)
     plan = floor_plan(cell, start, motions, _task_points(cell), state=swept_state(whole))
@@ -154,11 +154,6 @@ def _of_cell(cell: Cell, progress: Progress) -> FloorPlan:
         started, state = cell, "Robots where the cell puts them, as no start was found"
     start = {robot.name: standing(robot) for robot in started.robots}
     return floor_plan(started, start, [], _task_points(started), state=state)
-
-
-def _by_robot(cell: Cell, q: Array) -> Mapping[str, Array]:
-    """Stacked joint positions of shape (N, nq) by robot."""
-    return {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots}
 
 
 def _task_points(cell: Cell) -> dict[str, Array]:

@@ -160,7 +160,7 @@ def shortened(check: MoveCheck, path: Array, velocity: Array, rng: np.random.Gen
     for _ in range(SHORTCUTS):
         if len(path) == 2:
             break
-        lengths = np.append(0.0, np.cumsum(_lengths(path, velocity)))
+        lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0) / velocity, axis=1)))
         first, last = np.sort(rng.uniform(0.0, lengths[-1], 2))
         a, b = (np.array([np.interp(at, lengths, column) for column in path.T]) for at in (first, last))
         if float(np.linalg.norm((b - a) / velocity)) > (1.0 - GAIN) * (last - first):
@@ -198,8 +198,3 @@ def _without_detours(check: MoveCheck, path: Array) -> Array:
         free = (k for k in range(len(path) - 1, here + 1, -1) if check.is_free(path[here], path[k]))
         vertices.append(next(free, here + 1))
     return path[vertices]
-
-
-def _lengths(path: Array, velocity: Array) -> Array:
-    """Lengths between neighbouring via points in [s], shape (K - 1,)."""
-    return np.linalg.norm(np.diff(path, axis=0) / velocity, axis=1)

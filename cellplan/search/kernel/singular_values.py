@@ -70,7 +70,7 @@ class SingularValues:
         local, _ = flange_axes(job)
         left, rates = np.zeros((*screws.tip.shape[:2], 6)), np.zeros(screws.operators.shape[:3])
         for place, (J, is_constrained) in zip(arms(job), _jacobians(job, screws), strict=True):
-            last = _count(J, is_constrained) - 1
+            last = min(int(is_constrained.sum()), J.shape[2]) - 1
             u, _, v = np.linalg.svd(J)
             left[:, place], rates[:, place] = u[:, :, last], v[:, last] @ local[place].to_joints.T
         changes = JacobianChanges(job, screws, rates, np.zeros(screws.shared.shape[:2]), at_tips=True)
@@ -126,8 +126,3 @@ def _least(J: Array, is_constrained: Flags) -> Array:
     turned = np.swapaxes(rows, 1, 2)
     square = rows @ turned if rows.shape[1] <= rows.shape[2] else turned @ rows
     return np.sqrt(np.maximum(np.linalg.eigvalsh(square)[:, 0], 0.0)).astype(np.float64)
-
-
-def _count(J: Array, is_constrained: Flags) -> int:
-    """Number of singular values that count."""
-    return min(int(is_constrained.sum()), J.shape[2])

@@ -139,7 +139,7 @@ def read_attempts(request: LayoutRequest, cell: Cell) -> list[Cell]:
 def _varied(cell: Cell, request: LayoutRequest) -> dict[str, Any]:
     """What may change: as the cell says, or as it is by default, with the options of the request."""
     written = written_vary(cell) or (_by_default(cell) if request.fixed and not request.vary else {})
-    vary = {short_key(key): _plain(value) for key, value in written.items()}
+    vary = {short_key(key): dict(value) if isinstance(value, Mapping) else value for key, value in written.items()}
     for text in request.vary:
         key, sign, ranges = text.partition("=")
         vary[short_key(key.strip())] = read_setting(f"{key.strip()}={ranges}", option="--vary")[1] if sign else True
@@ -196,11 +196,6 @@ def _keys(vary: Mapping[str, Any]) -> Iterable[str]:
 def short_key(key: str) -> str:
     """A key without ``robots.``, which may be left out."""
     return key.removeprefix(PREFIX)
-
-
-def _plain(value: Any) -> Any:
-    """A value that can be changed."""
-    return dict(value) if isinstance(value, Mapping) else value
 
 
 def freed(cell: Cell, words: Iterable[str]) -> dict[str, object]:
