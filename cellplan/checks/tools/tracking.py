@@ -44,7 +44,7 @@ def _worst_errors(
     subject: str,
     of: str,
 ) -> Iterator[Check]:
-    """Position and orientation error, from a row on, at their worst instants against their limits in [mm] and [deg]."""
+    """Position and orientation error, from a row on, where each is largest, against their limits in [mm] and [deg]."""
     kinds = (errors.position_error, MM, "mm"), (errors.orientation_error, DEG, "deg")
     for (name, limit), (error, scale, unit) in zip(limits.items(), kinds, strict=True):
         lengths = scale * np.linalg.norm(error[first:], axis=1)
