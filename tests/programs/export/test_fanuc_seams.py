@@ -27,7 +27,7 @@ WORK = """circle: {radius_mm: 40, plane: xz}, project: +y}
     retract_s: 1
     process: {feed_mm_s: 20, on_delay_s: 0.3, off_delay_s: 0.2}"""
 CHANGES = {
-    "feed": ("P[4] 20mm/sec", "P[4] 21mm/sec"),
+    "feed": ("P[4:frame_3] 20mm/sec", "P[4:frame_3] 21mm/sec"),
     "weld data": ("Weld Start[1,1]", "Weld Start[1,2]"),
     "user frame": ("UFRAME_NUM=3", "UFRAME_NUM=2"),
     "user frame of a point": ("UF : 3, UT : 1, CONFIG", "UF : 2, UT : 1, CONFIG"),
@@ -40,11 +40,11 @@ CHANGES = {
     "no end of the weld": ("\r\n    :  Weld End[1,1]", ""),
     "no end of the weave": ("  Weave End ;", "   ;"),
     "other weave": ("Weave Sine[1]", "Weave Sine[2]"),
-    "CNT at the end of the weld": ("P[9] 20mm/sec FINE", "P[9] 20mm/sec CNT100"),
-    "corner at the end of the weld": ("P[9] 20mm/sec FINE", "P[9] 20mm/sec CR20"),
-    "larger corner": ("P[4] 20mm/sec CR2", "P[4] 20mm/sec CR20"),
-    "line for an arc": ("C P[3]\r\n    :  P[4]", "L P[4]"),
-    "joints for a line": ("L P[10] 93.8mm/sec", "J P[10] 10%"),
+    "CNT at the end of the weld": ("P[8:frame_7] 20mm/sec FINE", "P[8:frame_7] 20mm/sec CNT100"),
+    "corner at the end of the weld": ("P[8:frame_7] 20mm/sec FINE", "P[8:frame_7] 20mm/sec CR20"),
+    "larger corner": ("P[4:frame_3] 20mm/sec CR2", "P[4:frame_3] 20mm/sec CR20"),
+    "line for an arc": ("C P[3:frame_2]\r\n    :  P[4:frame_3]", "L P[4:frame_3]"),
+    "joints for a line": ("L P[9:frame_8] 93.8mm/sec", "J P[9:frame_8] 10%"),
     "handshake": ("DO[1]=ON", "DO[1]=OFF"),
 }
 
@@ -112,7 +112,7 @@ def test_a_change_of_a_seam_is_noticed(change: str, exported: tuple[Path, Verifi
     assert noticed(exported, tmp_path, text.replace(old, new, 1))
 
 
-@pytest.mark.parametrize("place", range(0, 27, 4))
+@pytest.mark.parametrize("place", range(0, 24, 4))
 def test_a_point_that_is_off_is_noticed(place: int, exported: tuple[Path, VerifiedRun], tmp_path: Path) -> None:
     text = (exported[0] / SEAM).read_bytes().decode()
     number = list(re.finditer(r"[XYZ] = (-?[\d.]+) mm", text))[place]

@@ -41,18 +41,28 @@ def test_a_seam_is_a_program_of_lines_and_arcs_in_the_frame_of_the_part() -> Non
     assert re.fullmatch(r"J P\[1\] \d+% FINE", seam.pop(2))
     assert seam == [
         *("UFRAME_NUM=4", "UTOOL_NUM=2"),
-        *("L P[2] 12.5mm/sec FINE Weld Start[1,1]", "Weave Sine[1]"),
-        *("L P[3] 8mm/sec CR3", "C P[4] P[5] 8mm/sec CR2", "L P[6] 8mm/sec FINE Weld End[1,1]", "Weave End"),
-        "L P[7] 12.5mm/sec FINE",
+        *("L P[2:work_of_alph_1] 12.5mm/sec FINE Weld Start[1,1]", "Weave Sine[1]"),
+        *(
+            "L P[3:work_of_alph_2] 8mm/sec CR3",
+            "C P[4:work_of_alph_3] P[5:work_of_alph_4] 8mm/sec CR2",
+            "L P[6:work_of_alph_5] 8mm/sec FINE Weld End[1,1]",
+            "Weave End",
+        ),
+        "L P[7:work_of_alph_6] 12.5mm/sec FINE",
     ]
-    assert re.findall(r"(?s)P\[4\]\{.*?\};", files[SEAM])[0].count("UF : 4, UT : 2, CONFIG : '") == 1
+    assert re.findall(r"(?s)P\[4:.work_of_alph_3.\]\{.*?\};", files[SEAM])[0].count("UF : 4, UT : 2, CONFIG : '") == 1
 
 
 def test_outputs_wait_for_the_delays_that_nothing_else_holds() -> None:
     seam = instructions(FANUC_LS.render(seam_job(process=OUTPUT))[SEAM])
 
-    assert seam[3:6] == ["L P[2] 12.5mm/sec FINE", "DO[7]=ON", "WAIT 0.30(sec)"]
-    assert seam[-4:] == ["L P[6] 8mm/sec FINE", "WAIT 0.20(sec)", "DO[7]=OFF", "L P[7] 12.5mm/sec FINE"]
+    assert seam[3:6] == ["L P[2:work_of_alph_1] 12.5mm/sec FINE", "DO[7]=ON", "WAIT 0.30(sec)"]
+    assert seam[-4:] == [
+        "L P[6:work_of_alph_5] 8mm/sec FINE",
+        "WAIT 0.20(sec)",
+        "DO[7]=OFF",
+        "L P[7:work_of_alph_6] 12.5mm/sec FINE",
+    ]
 
 
 def test_a_speed_in_the_weld_data_is_that_of_the_motions_in_process() -> None:
@@ -126,19 +136,77 @@ def message(job: ExportJob, old: str, new: str, *, file: str = SEAM) -> str:
         ("8mm/sec CR3", "0mm/sec CR3", "expected a speed up to 2000 mm/sec"),
         ("12.5mm/sec FINE ;\r\n/POS", "12.5mm/sec CR9 ;\r\n/POS", "expected FINE at the last point"),
         ("12.5mm/sec FINE\r\n", "12.5mm/sec CR9\r\n", "expected FINE before it, got 'Weave Sine[1] behind CNT or CR'"),
-        ("L P[3] 8mm/sec", "J P[3] 8%", "expected a statement that these programs have"),
-        ("L P[3] 8mm/sec CR3", "J P[3] 8% FINE", "expected J outside of seams and at their first point"),
-        ("C P[4]", "L P[4]", "expected a statement that these programs have"),
-        ("C P[4]\r\n    :  P[5]", "L P[5]", "expected points that are used, got 'P[4]'"),
-        ("   7:L P[3] 8mm/sec CR3 ;\r\n", "", "expected points that are used, got 'P[3]'"),
-        ("    :  P[5] 8mm/sec CR2 ;", "    :  P[5] 8mm/sec CR2", "expected one numbered instruction"),
-        ("P[7] 12.5mm/sec FINE ;", "P[7] 12.5mm/sec FINE ;\r\n  99:  WAIT 1.00(sec) ;", "expected after this move"),
-        ("P[7] 12.5mm/sec FINE ;", "P[7] 12.5mm/sec FINE ;\r\n  99:  CALL OTHER ;", "expected after this move"),
+        ("L P[3:work_of_alph_2] 8mm/sec", "J P[3:work_of_alph_2] 8%", "expected a statement that these programs have"),
+        (
+            "L P[3:work_of_alph_2] 8mm/sec CR3",
+            "J P[3:work_of_alph_2] 8% FINE",
+            "expected J outside of seams and at their first point",
+        ),
+        ("C P[4:work_of_alph_3]", "L P[4:work_of_alph_3]", "expected a statement that these programs have"),
+        (
+            "C P[4:work_of_alph_3]\r\n    :  P[5:work_of_alph_4]",
+            "L P[5:work_of_alph_4]",
+            "expected points that are used, got 'P[4]'",
+        ),
+        ("   7:L P[3:work_of_alph_2] 8mm/sec CR3 ;\r\n", "", "expected points that are used, got 'P[3]'"),
+        (
+            "    :  P[5:work_of_alph_4] 8mm/sec CR2 ;",
+            "    :  P[5:work_of_alph_4] 8mm/sec CR2",
+            "expected one numbered instruction",
+        ),
+        (
+            "P[7:work_of_alph_6] 12.5mm/sec FINE ;",
+            "P[7:work_of_alph_6] 12.5mm/sec FINE ;\r\n  99:  WAIT 1.00(sec) ;",
+            "expected after this move",
+        ),
+        (
+            "P[7:work_of_alph_6] 12.5mm/sec FINE ;",
+            "P[7:work_of_alph_6] 12.5mm/sec FINE ;\r\n  99:  CALL OTHER ;",
+            "expected after this move",
+        ),
     ],
 )
 def test_a_broken_seam_is_refused(old: str, new: str, said: str) -> None:
     assert f"{SEAM}:" in (got := message(seam_job(process=WELD), old, new))
     assert said in got
+
+
+def test_points_of_a_seam_are_named_after_its_task() -> None:
+    text = FANUC_LS.render(seam_job(passes=2))[SEAM]
+
+    assert re.findall(r'^P\[(\d+)(?::"(.*)")?\]\{', text, re.M) == [
+        ("1", ""),
+        *((str(number), f"work_of_alph_{number - 1}") for number in range(2, 8)),
+    ]
+    assert "P[" not in re.sub(r"P\[1\]|P\[(\d):work_of_alph_\d\]|P\[\d:\"work_of_alph_\d\"\]", "", text)
+
+
+@pytest.mark.parametrize(
+    ("point", "motion", "said"),
+    [
+        ("P[3]", "P[3]", ""),
+        ('P[3:"corner"]', "P[3]", ""),
+        ('P[3 : "the 2nd corner"]', "P[3:the 2nd corner]", ""),
+        ('P[3:""]', "P[3]", ""),
+        ("P[3]", "P[3:corner]", "expected P[3] with the name of the point, '', or with none, got 'corner'"),
+        ('P[3:"corner"]', "P[3:edge]", "expected P[3] with the name of the point, 'corner', or with none, got 'edge'"),
+        ('P[3:"a corner of a long name"]', "P[3]", "expected P[n]{ .. };"),
+        ("P[3:corner]", "P[3]", "expected P[n]{ .. };"),
+    ],
+)
+def test_names_of_points_may_be_others_or_none(point: str, motion: str, said: str) -> None:
+    """They are changed on the pendant; a motion with that of another point is a point exchanged."""
+    job = seam_job(process=WELD)
+    text = FANUC_LS.render(job)[SEAM]
+    assert text.count("P[3:work_of_alph_2]") == text.count('P[3:"work_of_alph_2"]') == 1
+    text = text.replace("P[3:work_of_alph_2]", motion).replace('P[3:"work_of_alph_2"]', point)
+    files = {**FANUC_LS.render(job), SEAM: text}
+
+    if not said:
+        assert FANUC_LS.read(job.frame, files)[0].robots["alpha"].seams == job.programs[0].robots["alpha"].seams
+        return
+    with pytest.raises(InputError, match=re.escape(said)):
+        FANUC_LS.read(job.frame, files)
 
 
 @pytest.mark.parametrize(

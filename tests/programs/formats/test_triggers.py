@@ -81,10 +81,10 @@ LANGUAGES = {
         tp_job(),
         "ALPHA_WORK_OF_ALPHA.ls",
         [
-            "P[2] 12.5mm/sec FINE TB .12sec,DO[7]=ON ;",
-            "P[3] 8mm/sec CR3 ;",
-            "P[5] 8mm/sec CR2 ;",
-            "P[6] 8mm/sec FINE TB .05sec,DO[7]=OFF ;",
+            "P[2:work_of_alph_1] 12.5mm/sec FINE TB .12sec,DO[7]=ON ;",
+            "P[3:work_of_alph_2] 8mm/sec CR3 ;",
+            "P[5:work_of_alph_4] 8mm/sec CR2 ;",
+            "P[6:work_of_alph_5] 8mm/sec FINE TB .05sec,DO[7]=OFF ;",
         ],
     ),
 }
@@ -152,7 +152,12 @@ CHANGES = [
     ("tp", " TB .12sec,DO[7]=ON", "", "a process that is on before"),
     ("tp", " TB .05sec,DO[7]=OFF", "", "a stop ends its process"),
     ("tp", "7% FINE", "7% FINE TB .12sec,DO[7]=ON", AS_STATED),
-    ("tp", "P[3] 8mm/sec CR3", "P[3] 8mm/sec CR3 TB .12sec,DO[7]=ON", "a process that is off before"),
+    (
+        "tp",
+        "P[3:work_of_alph_2] 8mm/sec CR3",
+        "P[3:work_of_alph_2] 8mm/sec CR3 TB .12sec,DO[7]=ON",
+        "a process that is off before",
+    ),
 ]
 
 

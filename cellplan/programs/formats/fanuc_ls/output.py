@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Final
 
 from cellplan.geometry.transforms import Array
@@ -34,12 +35,14 @@ class TpText:
     name: str
     groups: Sequence[MotionGroup]
     instructions: list[str]  # a line feed stands where one goes on in the next line
-    points: list[list[str]] = field(default_factory=list)  # what is said of each group, of each point
+    points: list[list[str]] = field(default_factory=list)  # the lines of each point
 
-    def point(self, poses: Iterable[Sequence[str]]) -> str:
-        """Add a point with its pose of each group; what it is called in motions."""
-        self.points.append([line for pose in poses for line in pose])
-        return f"P[{len(self.points)}]"
+    def point(self, poses: Iterable[Sequence[str]], name: str = "") -> str:
+        """Add a point with its pose of each group, which may have a name; what it is called in motions."""
+        number = len(self.points) + 1
+        head = f'P[{number}:"{name}"]{{' if name else f"P[{number}]{{"
+        self.points.append([head, *(line for pose in poses for line in pose), "};"])
+        return f"P[{number}:{name}]" if name else f"P[{number}]"
 
     def move(self, motion: str, poses: Iterable[Sequence[str]]) -> None:
         """Add a motion, which has braces for its point."""
@@ -61,8 +64,7 @@ class TpText:
             f"DEFAULT_GROUP = {','.join('1' if slot in moved else '*' for slot in range(1, slots + 1))};",
             "CONTROL_CODE = 00000000 00000000;",
         ]
-        points = [line for number, said in enumerate(self.points, start=1) for line in (f"P[{number}]{{", *said, "};")]
-        return joined([*head, "/MN", *lines, "/POS", *points, "/END"], line_end=LINE_END)
+        return joined([*head, "/MN", *lines, "/POS", *chain.from_iterable(self.points), "/END"], line_end=LINE_END)
 
 
 def frames(group: MotionGroup, base: int | None = None) -> Iterator[str]:

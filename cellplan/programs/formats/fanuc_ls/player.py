@@ -1,6 +1,7 @@
 """A TP program followed statement by statement, its pages and programs of seams in the places of their calls."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -145,11 +146,13 @@ class TpPlayer:
             raise statement.error("UFRAME_NUM and UTOOL_NUM of each group before the first motion")
         if is_joint is not (self.is_fresh or self.task is None):
             raise statement.error("J outside of seams and at their first point, L and C behind it")
-        numbers, motion = _motion(statement, is_timed=self.in_step and bool(self.motions))
-        points = tuple(point for number in numbers if (point := self.unused.pop(number, None)) is not None)
-        if len(points) < len(numbers):
+        names, motion = _motion(statement, is_timed=self.in_step and bool(self.motions))
+        points = tuple(point for number, _ in names if (point := self.unused.pop(number, None)) is not None)
+        if len(points) < len(names):
             raise statement.error("points of this file, each once")
-        for point in points:
+        for point, (number, name) in zip(points, names, strict=True):
+            if name not in {"", point.name}:
+                raise statement.error(f"P[{number}] with the name of the point, '{point.name}', or with none", name)
             for group in groups:
                 _require_pose(point, group, self._base(group), is_joint=is_joint)
         self.motions.append(replace(motion, points=points, task=self.task))
@@ -163,8 +166,8 @@ class TpPlayer:
             raise file.end.error("FINE at the last point", "CNT or CR")
 
 
-def _motion(statement: Statement, *, is_timed: bool) -> tuple[list[int], TpMotion]:
-    """Numbers of the points of a motion, and how it leads there."""
+def _motion(statement: Statement, *, is_timed: bool) -> tuple[list[tuple[int, str]], TpMotion]:
+    """Numbers and names of the points of a motion, and how it leads there."""
     if statement.kind != "J":
         *points, speed, ending, suffix = statement.words
         region = 0.0 if ending == "FINE" else float(str(ending).removeprefix("CR"))
@@ -172,7 +175,7 @@ def _motion(statement: Statement, *, is_timed: bool) -> tuple[list[int], TpMotio
         if region > MOST_REGION or not (math.isnan(feed) or 0.0 < MM * feed <= MOST_FEED):
             raise statement.error(f"a speed up to {MOST_FEED:g} mm/sec, and FINE or CR0 to CR{MOST_REGION}")
         motion = TpMotion(statement=statement, feed=feed, region=region, suffix=suffix or "")
-        return [int(str(point)) for point in points], motion
+        return _names(points), motion
     point, speed, unit, ending, suffix = statement.words
     if (unit in MILLISECONDS) is not is_timed:
         raise statement.error("a duration in sec or msec" if is_timed else "a speed in %", f"{speed}{unit}")
@@ -182,7 +185,12 @@ def _motion(statement: Statement, *, is_timed: bool) -> tuple[list[int], TpMotio
     if ending != "FINE" and int(str(ending).removeprefix("CNT")) > 100:
         raise statement.error("FINE, or CNT0 to CNT100", ending)
     duration, is_passed = value if is_timed else 0.0, ending != "FINE"
-    return [int(str(point))], TpMotion(statement=statement, duration=duration, is_passed=is_passed, suffix=suffix or "")
+    return _names([point]), TpMotion(statement=statement, duration=duration, is_passed=is_passed, suffix=suffix or "")
+
+
+def _names(points: Sequence[str | None]) -> list[tuple[int, str]]:
+    """Numbers of points with their names, which are empty where only the number stands."""
+    return [(int(number), name) for number, _, name in (str(point).partition(":") for point in points)]
 
 
 def _require_pose(point: TpPoint, group: MotionGroup, base: int, *, is_joint: bool) -> None:

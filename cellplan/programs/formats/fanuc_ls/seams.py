@@ -11,10 +11,10 @@ from cellplan.model.units import MM
 from cellplan.programs.elements.corners import LARGEST_SHARE
 from cellplan.programs.elements.paced import Events, Move
 from cellplan.programs.elements.pages import PagedProgram
-from cellplan.programs.elements.text import comment, fixed
+from cellplan.programs.elements.text import comment, fixed, safe_names
 from cellplan.programs.formats.fanuc_ls.output import TpText, frames, instruction, joint_pose, tool_pose
 from cellplan.programs.formats.fanuc_ls.poses import configuration, configuration_text
-from cellplan.programs.formats.fanuc_ls.text import REMARK
+from cellplan.programs.formats.fanuc_ls.text import COMMENT, REMARK
 
 MOST_REGION: Final = 1000  # [mm] of a corner region
 MOST_FEED: Final = 2000.0  # [mm/s]
@@ -50,6 +50,8 @@ def write_seam(
     robot, group = part.placed.name, text.groups[0]
     events, task = tp_events(frame, robot), frame.cell.task(seam.task)
     number = frame.station(robot, task.name).number or group.base
+    names = [one.name for one in frame.cell.tasks if one.robot == robot]
+    name = safe_names(names, longest=COMMENT - len("_999"))[task.name]
     notes = [f"task {task.name}"]
     if speed_is_held(events, task.name, in_process=True) and events.form is not None:
         notes.append(f"if {events.form.feed_in(task.name)} holds {MM * (task.feed or 0.0):g} mm/s")
@@ -60,7 +62,9 @@ def write_seam(
         if move.is_tool and part.rows.X_PT is not None:
             rows = [move.row] if move.middle is None else [move.middle, move.row]
             poses = [tool_pose(group, part, row, part.rows.X_PT[row], base=number, config=configs[row]) for row in rows]
-            points = "\n".join(text.point([pose]) for pose in poses)
+            points = "\n".join(
+                text.point([pose], f"{name}_{row - seam.first}") for row, pose in zip(rows, poses, strict=True)
+            )
             speed, ending = _feed(events, task.name, move), _ending(move, shares[move.row])
             motion = " ".join(["L" if move.middle is None else "C", points, speed, ending, *move.triggers])
         else:

@@ -9,7 +9,7 @@ from cellplan.errors import InputError
 from cellplan.programs.elements.text import Statement, lines_of, truncated_error
 
 LINES: Final = 9999  # most of a program
-COMMENT: Final = 16  # most characters of the comment of a program
+COMMENT: Final = 16  # most characters of the comment of a program or a point
 REMARK: Final = 32  # most characters of a remark
 SLOTS: Final = 5  # groups that DEFAULT_GROUP lists, or more where a higher one moves
 _SECTIONS: Final = ("/PROG", "/ATTR", "/MN", "/POS", "/END")
@@ -37,8 +37,8 @@ _GROUP: Final = re.compile(
     rf"GP([1-8])\s*:\s*UF\s*:\s*([0-9]{{1,3}})\s*,\s*UT\s*:\s*([0-9]{{1,3}})\s*,"
     rf"\s*(?:{_CONFIG})?\s*({_AXES}(?:\s*,\s*{_AXES})*)\s*"
 )
-_POINT: Final = re.compile(r"P\s*\[\s*([0-9]{1,5})\s*\]\s*\{\s*(.*?)\s*\}\s*;")
-_P: Final = r"P\s*\[\s*([0-9]{1,5})\s*\]\s+"
+_POINT: Final = re.compile(rf'P\s*\[\s*([0-9]{{1,5}})\s*(?::\s*"([^"]{{0,{COMMENT}}})"\s*)?\]\s*\{{\s*(.*?)\s*\}}\s*;')
+_P: Final = rf"P\s*\[\s*([0-9]{{1,5}}(?:\s*:[^\]\"]{{0,{COMMENT}}})?)\s*\]\s+"
 _FEED: Final = r"(?:([0-9]{1,4}(?:\.[0-9])?)\s*mm/sec|WELD_SPEED)\s+(FINE|CR\s*[0-9]{1,4})"
 _SUFFIX: Final = r"(?:\s+(\S.*))?"
 _PATTERNS: Final = {
@@ -73,6 +73,7 @@ class TpPoint(NamedTuple):
 
     statement: Statement  # where it begins
     poses: Mapping[int, TpPose]  # by number of the group
+    name: str = ""
 
 
 class TpFile(NamedTuple):
@@ -168,27 +169,27 @@ def _points(lines: Sequence[Statement]) -> dict[int, TpPoint]:
     for line in lines:
         block.append(line)
         if line.text.endswith("};"):
-            number, poses = _point(block[0], " ".join(part.text for part in block))
+            number, point = _point(block[0], " ".join(part.text for part in block))
             if number in points:
                 raise block[0].error("each point once", f"P[{number}] again")
-            points[number] = TpPoint(block[0], poses)
+            points[number] = point
             block = []
     if block:
         raise block[0].error("a point that ends in };")
     return points
 
 
-def _point(begin: Statement, text: str) -> tuple[int, dict[int, TpPose]]:
+def _point(begin: Statement, text: str) -> tuple[int, TpPoint]:
     """Number of a point and what it says of its groups."""
     match = _POINT.fullmatch(text)
     if match is None:
         raise begin.error("P[n]{ .. };", text)
     poses: dict[int, TpPose] = {}
     place = 0
-    while place < len(match[2]):
-        group = _GROUP.match(match[2], place)
+    while place < len(match[3]):
+        group = _GROUP.match(match[3], place)
         if group is None or int(group[1]) in poses:
-            raise begin.error("GPn: UF : n, UT : n, and axes in deg or mm, of each group once", match[2][place:])
+            raise begin.error("GPn: UF : n, UT : n, and axes in deg or mm, of each group once", match[3][place:])
         axes = _AXIS.findall(group[5])
         units = {name: unit for name, _, unit in axes}
         if len(units) < len(axes):
@@ -196,4 +197,4 @@ def _point(begin: Statement, text: str) -> tuple[int, dict[int, TpPose]]:
         values = [float(value) for _, value, _ in axes]
         poses[int(group[1])] = TpPose(int(group[2]), int(group[3]), units, values, group[4] or "")
         place = group.end()
-    return int(match[1]), poses
+    return int(match[1]), TpPoint(begin, poses, match[2] or "")
