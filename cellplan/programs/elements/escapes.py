@@ -21,7 +21,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step
+from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step, task_group
 from cellplan.programs.elements.joints import Angle, from_numbers
 
 REGISTER: Final = "cell_step"  # name of a step register where the cell states none
@@ -151,6 +151,11 @@ def _require_marks(frame: ExportFrame) -> None:
     if len(frame.cell.robots) < 2 or frame.programs != (None,):
         got = f"{len(frame.cell.robots)} robots and {len(frame.programs)} programs"
         raise InputError(f"--escape: expected robots that wait for one another in one program from home, got {got}")
+    for group in filter(None, (task_group(frame, robot.name) for robot in frame.cell.robots)):
+        raise InputError(
+            f"robots.{group[0]}.controller.handshake: expected the inputs that {', '.join(map(repr, group[1:]))} set, "
+            "as escape programs ask one another by wires, got none"
+        )
 
 
 def read_escape(form: EscapeForm, expected: EscapeProgram, files: Mapping[str, str]) -> EscapeProgram:

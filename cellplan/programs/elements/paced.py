@@ -16,7 +16,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows, Seam
 from cellplan.model.units import MM
 from cellplan.programs.elements.corners import row_shares
-from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step
+from cellplan.programs.elements.handshake import HandshakeStep, first_steps, handshake_steps
 from cellplan.programs.elements.process import ProcessForm
 
 Which = Literal["on", "inner", "off"]
@@ -103,8 +103,8 @@ class Events:
 
     def before(self, has_marks: bool) -> tuple[str, ...]:
         """Statements before the first move: the output of the robot is lowered where it waits for others."""
-        first = [self.signal(lowering_step(self.frame, self.robot))] if has_marks and self._steps else []
-        return (*self.setup, *first)
+        first = first_steps(self.frame, self.robot) if has_marks and self._steps else []
+        return (*self.setup, *map(self.signal, first))
 
     @property
     def _steps(self) -> tuple[HandshakeStep, ...]:

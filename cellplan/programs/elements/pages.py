@@ -13,7 +13,7 @@ from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows
 from cellplan.programs.elements.corners import row_shares
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step
+from cellplan.programs.elements.handshake import HandshakeStep, first_steps, handshake_steps
 from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.joints import Axes, to_numbers
 from cellplan.programs.elements.text import ascii_text, safe_names
@@ -179,7 +179,7 @@ def paged(job: ExportJob, dialect: Dialect, program: ProgramRows, robot: str, pa
         decimals=decimals,
         speeds=_percentages(placed, rows),
         shares=shares_as_written(row_shares(job, program)[robot], numbers, pages),
-        first=[lowering_step(job.frame, robot)] if steps else [],
+        first=first_steps(job.frame, robot) if steps else [],
         steps=steps,
         pages=pages,
     )

@@ -1,5 +1,6 @@
 """Declarations of RAPID programs: data types, values that the cell states, and references to them."""
 
+import re
 from typing import Any, Final
 
 import numpy as np
@@ -8,12 +9,13 @@ from cellplan.geometry.transforms import Array, pose, pose_from, quaternion_to_r
 from cellplan.model.report.exported import ExportFrame, Promise
 from cellplan.model.units import MM
 from cellplan.programs.formats.rapid.text import Datum, RapidModule, RapidStatement, value_of
-from cellplan.programs.formats.rapid.units import PartFrame, RapidUnit, rapid_units
+from cellplan.programs.formats.rapid.units import PartFrame, RapidUnit, listed_tasks
 
 PLACE_TOL: Final = 1e-6  # [m] of a frame in a file against that of the cell
 TURN_TOL: Final = 1e-5  # [-] largest entry by which a rotation in a file may differ from that of the cell
 UNIT_TOL: Final = 1e-3  # [-] by which a quaternion in a file may miss unit length
 
+MEETING: Final = re.compile(r"waitsynctask (\w+),(\w+)", re.I)
 _POSE: Final = [["n"] * 3, ["n"] * 4]
 _SHAPES: Final[dict[str, Any]] = {
     "tooldata": ["b", _POSE, ["n", ["n"] * 3, ["n"] * 4, "n", "n", "n"]],
@@ -45,6 +47,12 @@ class RapidData:
     def target(self, statement: RapidStatement, name: str, *, is_cartesian: bool) -> str:
         """Text of a target that is declared."""
         return self.require(statement, name, "robtarget" if is_cartesian else "jointtarget").value or ""
+
+    def require_meeting(self, statement: RapidStatement) -> None:
+        """What a statement refers to at which tasks wait for one another is declared."""
+        if match := MEETING.fullmatch(statement.text):
+            self.require(statement, match[1], "syncident")
+            self.require(statement, match[2], "tasks")
 
     def tasks(self, name: str) -> list[str]:
         """Names in a list of tasks."""
@@ -83,7 +91,7 @@ def _examine(frame: ExportFrame, unit: RapidUnit, datum: Datum, part: PartFrame 
         return  # read where it is used
     value = value_of(datum)
     if datum.kind == "tasks":
-        _examine_tasks(frame, datum, value)
+        _examine_tasks(frame, unit, datum, value)
         return
     if not _has_shape(value, _SHAPES[datum.kind]):
         datum.statement.refuse(f"a value of {datum.kind}")
@@ -97,16 +105,16 @@ def _examine(frame: ExportFrame, unit: RapidUnit, datum: Datum, part: PartFrame 
         datum.statement.refuse("zones of 0 or more")
 
 
-def _examine_tasks(frame: ExportFrame, datum: Datum, value: Any) -> None:
-    """A list of tasks names those of all robots that move together."""
-    if frame.promise is not Promise.SYNCHRONISED:
+def _examine_tasks(frame: ExportFrame, unit: RapidUnit, datum: Datum, value: Any) -> None:
+    """A list of tasks names those of all robots that move together, or wait for one another without wires."""
+    expected = listed_tasks(frame, unit.robot.name)
+    if not expected:
         datum.statement.refuse("no list of tasks in programs that are not synchronised")
-    expected = [unit.task for unit in rapid_units(frame)]
     if not _has_shape(value, [["s"]] * len(expected)) or datum.count != len(expected):
         datum.statement.refuse(f"a list of {len(expected)} tasks")
     names = [entry[0] for entry in value]
-    if sorted(names) != sorted(str(task) for task in expected):
-        datum.statement.refuse(f"the tasks {', '.join(map(str, expected))}", ", ".join(names))
+    if sorted(names) != sorted(expected):
+        datum.statement.refuse(f"the tasks {', '.join(expected)}", ", ".join(names))
 
 
 def _examine_tool(unit: RapidUnit, datum: Datum, value: Any) -> None:

@@ -33,7 +33,7 @@ from cellplan.programs.formats.rapid.moves import STOP, Place, RapidMove, read_m
 from cellplan.programs.formats.rapid.rows import UNIT_TOL, rounding, rows_of
 from cellplan.programs.formats.rapid.targets import frame_text, joint_targets, part_targets
 from cellplan.programs.formats.rapid.text import Datum, RapidStatement, plain_statement, value_of
-from cellplan.programs.formats.rapid.units import DECIMALS, LONGEST_NAME, RESERVED, ZONES, RapidUnit, rapid_task
+from cellplan.programs.formats.rapid.units import DECIMALS, LONGEST_NAME, RESERVED, TASKS, ZONES, RapidUnit, rapid_task
 from cellplan.programs.formats.zones import on_scale
 
 LONGEST_ROUTINE: Final = LONGEST_NAME - 5  # room for the number of a point
@@ -70,6 +70,8 @@ def _trigger(lead: float, statement: str) -> str:
 
 def signal_text(step: HandshakeStep) -> str:
     """One instruction of a handshake."""
+    if step.meets:
+        return f"WaitSyncTask {step.signal},{TASKS};"
     return f"{'WaitDI' if step.waits else 'SetDO'} {step.signal},{int(step.is_on)};"
 
 
@@ -227,6 +229,7 @@ class PacedReader:
             place = Place(is_first=not moves, is_between=False, is_synchronised=False)
             move = read_move(statement, self._unit, self._data, place) if is_joint else self._tool_move(statement, task)
             if move is None:
+                self._data.require_meeting(statement)
                 between[-1].append(statement.text)
                 continue
             moves.append(move)

@@ -10,10 +10,10 @@ from typing import Final, NamedTuple
 
 from cellplan.errors import InputError
 from cellplan.model.report.exported import ExportFrame, ProgramRows, Promise, RobotRows
-from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step
-from cellplan.programs.formats.rapid.data import RapidData, read_data
+from cellplan.programs.elements.handshake import HandshakeStep, first_steps, handshake_steps, lowering_step
+from cellplan.programs.formats.rapid.data import MEETING, RapidData, read_data
 from cellplan.programs.formats.rapid.moves import Place, RapidMove, read_move
-from cellplan.programs.formats.rapid.paced import PacedReader
+from cellplan.programs.formats.rapid.paced import PacedReader, signal_text
 from cellplan.programs.formats.rapid.rows import rows_of
 from cellplan.programs.formats.rapid.text import RapidModule, RapidStatement, read_module
 from cellplan.programs.formats.rapid.units import WORDS, PartFrame, RapidUnit, part_frame, rapid_units, works_on_part
@@ -83,7 +83,8 @@ def _read_task(
     syncs: list[_Sync] = []
     marks: list[int] = []
     handshake = () if is_synchronised else handshake_steps(frame, unit.robot.name)
-    lowered = bool(handshake) and _lowers(frame, unit, statements)
+    has_output = not is_synchronised and bool(first_steps(frame, unit.robot.name))
+    lowered = has_output and _lowers(frame, unit, statements)
     place, between = int(lowered), False
     while place < len(statements):
         statement = statements[place]
@@ -96,8 +97,9 @@ def _read_task(
             syncs.append(_sync(statement, data, moves, between=between, synchronised=is_synchronised))
             between, place = syncs[-1].is_on, place + 1
         else:
-            if handshake and not lowered:
+            if has_output and not lowered:
                 statement.refuse(f"SetDO {lowering_step(frame, unit.robot.name).signal},0 before the first move")
+            data.require_meeting(statement)
             _handshake(statements[place : place + max(1, len(handshake))], handshake, moves, marks)
             marks.append(len(moves) - 1)
             place += len(handshake)
@@ -203,13 +205,11 @@ def _handshake(
 ) -> None:
     """The instructions of a handshake, behind a stop point, once at a row."""
     for statement, step in zip(statements, expected or (None,), strict=False):
-        shown = "a move" if step is None else f"{'WaitDI' if step.waits else 'SetDO'} {step.signal},{int(step.is_on)}"
-        match = _SIGNAL.fullmatch(statement.text)
-        if match is None:
+        if not (_SIGNAL.fullmatch(statement.text) or MEETING.fullmatch(statement.text)):
             statement.refuse("a move, a call or a handshake")
-        signal_step = HandshakeStep(match[1].lower() == "waitdi", match[2].lower(), match[3] == "1")
-        if step is None or signal_step != step._replace(signal=step.signal.lower()):
-            statement.refuse(shown)
+        expected_text = "a move" if step is None else signal_text(step).removesuffix(";")
+        if statement.text.lower().replace(" ", "") != expected_text.lower().replace(" ", ""):
+            statement.refuse(expected_text)
     if len(statements) < len(expected):
         statements[-1].refuse("the whole of a handshake")
     if not moves or not moves[-1].is_fine or len(moves) - 1 in marks:

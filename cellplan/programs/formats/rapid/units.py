@@ -11,6 +11,7 @@ from cellplan.model.report.exported import ExportFrame, Promise
 from cellplan.model.settings.controllers import RobotControlEntry
 from cellplan.model.task.task import Frame
 from cellplan.programs.elements.frames import on_flange
+from cellplan.programs.elements.handshake import MEETINGS, task_group
 from cellplan.programs.elements.joints import Axes
 from cellplan.programs.elements.text import safe_names
 from cellplan.programs.elements.timed_rows import decimals_of
@@ -29,7 +30,7 @@ _WORDS: Final = (
     "module nostepin not noview num or pers proc raise readonly record retry return robtarget speeddata step string "
     "sysmodule task tasks test then to tooldata tool0 trap true trynext undo var viewonly while with wobj0 wobjdata "
     "xor zonedata syncident load0 setdo waitdi moveabsj moveextj movel movej movec syncmoveon syncmoveoff triggdata "
-    "triggio triggl triggc"
+    "triggio triggl triggc waitsynctask"
 )
 
 
@@ -40,7 +41,7 @@ def zone_name(size: int) -> str:
 
 WORDS: Final = frozenset(_WORDS.split())  # of the language, and of what its controllers declare
 RESERVED: Final = WORDS.union(  # and names of declarations and pages here, and of speeds and zones of the language
-    {TASKS, SYNC_ON, SYNC_OFF, PART, FROM, ROWS, *map(zone_name, ZONES)}
+    {TASKS, SYNC_ON, SYNC_OFF, *MEETINGS, PART, FROM, ROWS, *map(zone_name, ZONES)}
     | {f"page_{number:03d}" for number in range(1, 1000)}
     | {f"{letter}{number}" for letter in "vz" for number in range(10_000)}
 )
@@ -171,6 +172,12 @@ def rapid_task(frame: ExportFrame, name: str) -> str:
         if not NAME.fullmatch(value):
             raise InputError(f"{key}: expected a name of at most {LONGEST_NAME} letters, digits and _, got {value!r}")
     return task
+
+
+def listed_tasks(frame: ExportFrame, name: str) -> list[str]:
+    """Tasks in the list of the program of a robot: those that move in step, or wait for one another without wires."""
+    robots = frame.robots if frame.promise is Promise.SYNCHRONISED else task_group(frame, name)
+    return [rapid_task(frame, robot) for robot in robots]
 
 
 def require_one_controller(frame: ExportFrame) -> None:

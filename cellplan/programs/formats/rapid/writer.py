@@ -35,7 +35,7 @@ from cellplan.model.units import MM
 from cellplan.programs.elements.corners import chosen_shares, moves, row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.frames import on_flange
-from cellplan.programs.elements.handshake import handshake_steps, lowering_step, signals_by_key
+from cellplan.programs.elements.handshake import first_steps, handshake_steps, signals_by_key
 from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.joints import from_numbers, to_numbers
 from cellplan.programs.elements.text import comment, fixed, joined, safe_names
@@ -58,6 +58,7 @@ from cellplan.programs.formats.rapid.units import (
     ZONES,
     PartFrame,
     RapidUnit,
+    listed_tasks,
     part_frame,
     rapid_task,
     rapid_units,
@@ -107,6 +108,7 @@ def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
             yield partial(rapid_task, frame, name)
         elif frame.promise.waits:
             yield partial(_require_names, frame, name)
+            yield partial(listed_tasks, frame, name)
         if works_on_part(frame, name):
             robot = frame.robot(name)
             yield partial(configuration, robot, np.zeros((1, len(robot.model.joints))))
@@ -160,7 +162,7 @@ def _paced_modules(
     notes = list(chain.from_iterable(comment(note, "!") for note in _notes(job, unit)))
     is_joint = ~paced.rows.on_seam
     sizes = [*paced.zones(), *(size for size, is_used in zip(zones, is_joint, strict=True) if is_used)]
-    data = [*notes, *_data(job, units, unit, None), *zone_data(unit, sizes), *paced.data()]
+    data = [*notes, *_data(job, unit, None), *zone_data(unit, sizes), *paced.data()]
     return {unit.module: _module(unit.module, data, routines)}
 
 
@@ -192,8 +194,7 @@ def _moves(
     if not is_synchronised:
         if rows.marks:
             _require_names(frame, unit.robot.name)
-            if handshake_steps(frame, unit.robot.name):
-                moves[0].insert(0, signal_text(lowering_step(frame, unit.robot.name)))
+            moves[0][:0] = map(signal_text, first_steps(frame, unit.robot.name))
         for mark in rows.marks:
             moves[mark] += [signal_text(step) for step in handshake_steps(frame, unit.robot.name)]
     return moves
@@ -228,7 +229,7 @@ def _modules(
     body = [f"page_{number:03d};" for number in range(1, len(pages) + 1)] or [*chain.from_iterable(rest)]
     if is_synchronised:
         body = [f"SyncMoveOn {SYNC_ON},{TASKS};", *body, f"SyncMoveOff {SYNC_OFF};"]
-    data = [*_data(job, units, unit, part), *zone_data(unit, zones)]
+    data = [*_data(job, unit, part), *zone_data(unit, zones)]
     files = {unit.module: _module(unit.module, [*notes, *data], {"main": [*first, *body]})}
     for number, (name, page) in enumerate(zip(names, pages, strict=True), start=1):
         files[called[name]] = _module(called[name], notes, {f"page_{number:03d}": [*chain.from_iterable(page)]})
@@ -250,13 +251,14 @@ def _notes(job: ExportJob, unit: RapidUnit) -> Iterator[str]:
         yield f"mass of the tool not stated: set the load of {unit.tool} before the first run"
 
 
-def _data(job: ExportJob, units: Sequence[RapidUnit], unit: RapidUnit, part: PartFrame | None) -> Iterator[str]:
+def _data(job: ExportJob, unit: RapidUnit, part: PartFrame | None) -> Iterator[str]:
     """Declarations of a robot's main module."""
-    if job.frame.promise is Promise.SYNCHRONISED:
-        names = ",".join(f'["{unit.task}"]' for unit in units)
-        yield f"PERS tasks {TASKS}{{{len(units)}}} := [{names}];"
-        yield f"VAR syncident {SYNC_ON};"
-        yield f"VAR syncident {SYNC_OFF};"
+    if tasks := listed_tasks(job.frame, unit.robot.name):
+        names = ",".join(f'["{task}"]' for task in tasks)
+        yield f"PERS tasks {TASKS}{{{len(tasks)}}} := [{names}];"
+        steps = handshake_steps(job.frame, unit.robot.name) if job.frame.promise.waits else ()
+        for name in (SYNC_ON, SYNC_OFF) if not steps else (step.signal for step in steps if step.meets):
+            yield f"VAR syncident {name};"
     if unit.has_tool:
         yield f"PERS tooldata {unit.tool} := [TRUE,{frame_text(unit.X_GT, DECIMALS)},{_load(unit)}];"
     if part is not None and works_on_part(job.frame, unit.robot.name):
