@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-Event = tuple[Any, ...]
+from builders.tp_controller import Event, TpController
+
 IGNORED = r"DECL .*|[;&!].*|BAS\(.*|\$(ADVANCE|TOOL|BASE)=.*|TPWrite .*|VAR (num|jointtarget) \w+;|"
 KRL = (
     (IGNORED, "pass", 0),
@@ -27,7 +28,7 @@ KRL = (
     (r"IF (.*) THEN", "if {0}:", 1),
     (r"FOR ROW=(.*) TO (\w+) STEP -1", "for ROW in range({0}, {1} - 1, -1):", 1),
     (r"FOR ROW=(\w+) TO (\w+)", "for ROW in range({0}, {1} + 1):", 1),
-    (r"SWITCH cell_step", "if M.step < 0:", 1),
+    (r"SWITCH cell_step", "if M.step < 0 or M.begin():", 1),
     (r"CASE (\d+)", "elif M.begun == {0}:", 2),
     (r"DEFAULT", "else:", 2),
     (r"cell_step=(\d+)", "M.step = {0}", 0),
@@ -48,7 +49,7 @@ RAPID = (
     (r"IF (.*) THEN", "if {0}:", 1),
     (r"FOR row FROM (.*) TO (\w+) STEP -1 DO", "for row in range({0}, {1} - 1, -1):", 1),
     (r"FOR row FROM (.*) TO (\w+) DO", "for row in range({0}, {1} + 1):", 1),
-    (r"TEST cell_step", "if M.step < 0:", 1),
+    (r"TEST cell_step", "if M.step < 0 or M.begin():", 1),
     (r"CASE (\d+):", "elif M.begun == {0}:", 2),
     (r"DEFAULT:", "else:", 2),
     (r"cell_step := (\d+);", "M.step = {0}", 0),
@@ -65,7 +66,7 @@ URSCRIPT = (
     (r"sleep\(1\.0\)", "yield ('pause',)", 0),
     (r"movej\((\w+)\(row\), .*\)", "yield ('move', (yield from {0}(M, row)))", 0),
     (r"halt", "yield ('halt',)", 0),
-    (r"step = read_output_integer_register\(24\)", "step = M.begun", 0),
+    (r"step = read_output_integer_register\(24\)", "step = M.begin() or M.step", 0),
     (r"write_output_integer_register\(24, (\d+)\)", "M.step = {0}", 0),
     (r"(if|while) (.*):", "{0} {1}:", 1),
     (r"(elif step == \d+|else):", "{0}:", 2),
@@ -73,6 +74,28 @@ URSCRIPT = (
     (r"(\w+) = (escape_rows)\((.*)\)", "{0} = yield from {1}(M, {2})", 0),
     (r"(\w+) = (.*)", "{0} = {1}", 0),
     (r"(\w+)\((.*)\)", "yield from {0}(M, {1})", 0),
+)
+VAL3 = (
+    (r"//.*|resetMotion\(\)|waitEndMove\(\)|", "pass", 0),
+    (r"nStep=\w+:cell_step", "M.begin()", 0),
+    (r"def (\w+)\((.*)\)", "def {0}(M, {1}):", 1),
+    (r"end|endIf|endFor|endWhile", "", -1),
+    (r"jHere=herej\(\)", "jHere = M.here()", 0),
+    (r"(\w+)=(true|false)", "yield ('out', '{0}', '{1}' == 'true')", 0),
+    (r"wait\((\w+)==(true|false)\)", "yield ('in', '{0}', '{1}' == 'true')", 0),
+    (r"delay\(1\)", "yield ('pause',)", 0),
+    (r"popUpMsg\(.*\)", "yield ('halt',)", 0),
+    (r"movej\((\w+)\[nRow-1\],tTool\[0\],mMove\[0\]\)", "yield ('move', list(vars({0}[nRow - 1]).values()))", 0),
+    (r"while true", "while True:", 1),
+    (r"for (\w+)=(.*) to (\w+) step -1", "for {0} in range({1}, {2} - 1, -1):", 1),
+    (r"for (\w+)=(\w+) to (\w+)", "for {0} in range({1}, {2} + 1):", 1),
+    (r"if nStep<0", "if M.step < 0:", 1),
+    (r"elseIf nStep==(\d+)", "elif M.begun == {0}:", 2),
+    (r"else", "else:", 2),
+    (r"if (.*)", "if {0}:", 1),
+    (r"\w+:cell_step=(\d+)", "M.step = {0}", 0),
+    (r"call (\w+)\((.*)\)", "yield from {0}(M, {1})", 0),
+    (r"(\w+)=(.*)", "{0} = {1}", 0),
 )
 
 
@@ -91,6 +114,7 @@ class Robot:
         """Begin with what its step register holds and where it stands."""
         self.q, self.ready, self.is_done, self.is_halted, self.moved = np.array(here), ready, False, False, False
         self.machine = SimpleNamespace(step=step, begun=step)
+        self.machine.begin = lambda: setattr(self.machine, "begun", self.machine.step)
         self._events = robot_program(files, self.machine, here)
         self.event: Event | None = None
         self.take()
@@ -159,6 +183,8 @@ def play(
 def robot_program(files: Mapping[str, str], machine: SimpleNamespace, here: Sequence[float]) -> Iterator[Event]:
     """The escape program of one robot, on a machine with a step register."""
     texts = {path.rpartition(".")[2]: text.replace("\r", "") for path, text in files.items()}
+    if "ls" in texts:
+        return TpController(files, machine, here).run(next(path for path in files if path.endswith("_ESC.ls"))[:-3], ())
     axes = [f"A{axis}" for axis in range(1, 7)] if "src" in texts else [f"rax_{axis}" for axis in range(1, 7)]
     names: dict[str, Any] = {}
     machine.here = lambda: SimpleNamespace(**dict(zip(axes, here, strict=True)))
@@ -168,6 +194,23 @@ def robot_program(files: Mapping[str, str], machine: SimpleNamespace, here: Sequ
             values = re.findall(r"A\d (-?[\d.]+)", numbers)
             names.setdefault(table, {})[int(row)] = SimpleNamespace(**dict(zip(axes, map(float, values), strict=True)))
         begin = next(name for name in names if name.endswith("_esc"))
+    elif "pgx" in texts:
+        axes = [f"j{axis}" for axis in range(1, 7)]
+        machine.here = lambda: SimpleNamespace(**dict(zip(axes, here, strict=True)))
+        for table, values in re.findall(r'name="(jEsc|jHome)".*?>\n(.*?)</Data>', texts["dtx"], re.DOTALL):
+            rows = [re.findall(r'j\d="(-?[\d.]+)"', row) for row in values.split("\n") if "j1=" in row]
+            names[table] = [SimpleNamespace(**dict(zip(axes, map(float, row), strict=True))) for row in rows]
+        wires = dict(
+            re.findall(
+                r'name="(\w+)"[^\n]* type="dio"[^\n]*\n *<Value key="0" link="BasicIO-1.%[IQ](\d+)"', texts["dtx"]
+            )
+        )
+        _translate(
+            [line for path, text in files.items() if path.endswith(".pgx") for line in _val3_lines(text, wires)],
+            VAL3,
+            names,
+        )
+        begin = "start"
     elif "script" in texts:
         waits = r"while (not )?get_standard_digital_in\((\d+)\):\n\s*sync\(\)\n\s*end"
         _translate(re.sub(waits, r"wait \1\2", texts["script"]).split("\n"), URSCRIPT, names)
@@ -189,6 +232,16 @@ def robot_program(files: Mapping[str, str], machine: SimpleNamespace, here: Sequ
         begin = "cell_escape"
     program: Iterator[Event] = names[begin](machine)
     return program
+
+
+def _val3_lines(text: str, wires: Mapping[str, str]) -> list[str]:
+    """A program as a routine with its parameters, whose signals are named after their wires."""
+    name = re.findall(r'<Program name="(\w+)"', text)[0]
+    parameters = re.findall(r'<Parameter name="(\w+)" type="num" xsi:type="element"/>', text)
+    code = text[text.index("CDATA[begin") + len("CDATA[begin") : text.index("]]>")]
+    for signal, wire in wires.items():
+        code = re.sub(rf"\b{signal}\b", wire, code)
+    return [f"def {name}({','.join(parameters)})", *code.split("\n")]
 
 
 def _translate(lines: Sequence[str], rules: Sequence[tuple[str, str, int]], names: dict[str, Any]) -> None:

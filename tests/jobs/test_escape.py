@@ -16,8 +16,9 @@ from cellplan.errors import InputError, NotVerifiedError
 from cellplan.jobs.recover.escape import WrittenEscape, escape_findings, escape_programs, homewards
 from cellplan.jobs.recover.legs import recovery_rows
 from cellplan.jobs.recover.state import RunPlaces
+from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import VerifiedRun
-from cellplan.programs.dialects import ESCAPES
+from cellplan.programs.dialects import DIALECTS, ESCAPES
 from cellplan.programs.elements.joints import exact_numbers, from_numbers
 from cellplan.programs.export.choice import Choice
 from cellplan.programs.shared import Shared
@@ -25,15 +26,52 @@ from cellplan.runs.gate.open_gate import open_gate
 
 pytestmark = pytest.mark.slow
 CELLS = Path(__file__).resolve().parents[2] / "cells"
+ZERO = "sign: {C1: -1}\ncoupling: {C1: {B1: -1}}\nsource: test\n"
 TOLERANCE = 1e-4  # [m] of distances of coal
 STOPS = 20  # of each step
 SIGNALS = "handshake: {output: %s, inputs: {holder: %s}}}\n"
+ONE = """\
+cellplan: 1
+name: one
+robots:
+  left:
+    model: kuka_kr6
+    base: {xyz_mm: [0, -1100, 0], rpy_deg: [0, 0, 90]}
+    tool: {xyz_mm: [0, 0, 150], geometry: {capsule: {radius_mm: 12, length_mm: 150}}}
+    home_deg: [0, -20, 50, 0, -45, 0]
+    controller: {id: krc, tool_number: 1, base: {}, tool_frame: {}}
+controllers: {krc: {kind: kuka}}
+part: {geometry: {box: {size_mm: [600, 300, 200]}}, at: {xyz_mm: [0, 0, 900]}}
+tasks:
+  ring:
+    robot: left
+    path: {circle: {radius_mm: 60, plane: xz}, project: -y}
+    tool_axis: normal
+    approach_mm: 80
+    approach_s: 1
+    retract_mm: 80
+    retract_s: 1
+    duration_s: 4
+environment: {floor: {plane: {z_mm: 0}}}
+motion: {mode: part_at_rest, duration_s: 6, step_s: 0.02}
+program: {}
+checks: {clearance_mm: 5}
+"""
 CHANGES = {
     "in_turn": {
         "kind: reis": "kind: kuka",
         "kind: staubli": "kind: abb, tasks: {T_ROB1: ROB_1}",
         "{id: cs,": "{id: cs, task: T_ROB1,",
     },
+    "in_turn_elsewhere": {
+        "kind: reis": "kind: fanuc",
+        "model: reis_rv20_16": "model: reis_rv20_16\n    controller_zero: zero.yaml",
+        "kind: abb, tasks: {T_ROB1: ROB_1}": "kind: fanuc",
+        "task: T_ROB1, cycle_ms: 4, decimals: 5, handshake: {output: doThere, inputs: {reis: diGo}}": "cycle_ms: 4, "
+        "decimals: 5, handshake: {output: 1, inputs: {reis: 1}}",
+        "kind: kuka": "kind: staubli",
+    },
+    "in_turn_paced": {"kind: reis": "kind: kuka"},
     "three_tasks_each": {
         "    model: kuka_kr16_2\n": "    model: kuka_kr16_2\n"
         "    controller: {id: krc, handshake: {output: 1, inputs: {left: 1, right: 2}}}\n",
@@ -49,6 +87,18 @@ CHANGES = {
 def in_turn(tmp_path_factory: pytest.TempPathFactory) -> VerifiedRun:
     """Four robots that work in turn."""
     return run_of("in_turn", tmp_path_factory.mktemp("in_turn"))
+
+
+@pytest.fixture(scope="module")
+def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> VerifiedRun:
+    """The same four robots on controllers of other makers."""
+    return run_of("in_turn_elsewhere", tmp_path_factory.mktemp("elsewhere"))
+
+
+@pytest.fixture(scope="module")
+def paced(tmp_path_factory: pytest.TempPathFactory) -> VerifiedRun:
+    """The four robots, tools moved on lines and arcs in three languages."""
+    return run_of("in_turn_paced", tmp_path_factory.mktemp("paced"))
 
 
 @pytest.fixture(scope="module")
@@ -71,28 +121,31 @@ def escapes(in_turn: VerifiedRun, shared: Shared) -> dict[str, WrittenEscape]:
 
 def run_of(cell: str, folder: Path) -> VerifiedRun:
     """A shipped cell on controllers of kinds that have escape programs."""
-    text = (CELLS / f"{cell}.yaml").read_text(encoding="utf-8")
+    text = (CELLS / f"{re.sub('_(elsewhere|paced)$', '', cell)}.yaml").read_text(encoding="utf-8")
+    (folder / "zero.yaml").write_text(ZERO, encoding="utf-8")
     for old, new in CHANGES[cell].items():
         assert old in text
         text = text.replace(old, new, 1)
     (folder / "cell.yaml").write_text(text, encoding="utf-8")
     solve_into(folder / "cell.yaml", folder / "run")
-    return open_gate(folder / "run")
+    return open_gate(folder / "run", cell=folder / "cell.yaml")
 
 
-def escapes_of(run: VerifiedRun, shared: Shared) -> dict[str, WrittenEscape]:
-    """Programs and escape programs in both formats of a cell."""
-    forms = ("krl", "urscript" if any(entry.kind == "ur" for entry in run.cell.controllers.values()) else "rapid")
-    return {form: escape_programs(run, form, Choice(), shared=shared) for form in forms}
+def escapes_of(run: VerifiedRun, shared: Shared, choice: Choice | None = None) -> dict[str, WrittenEscape]:
+    """Programs and escape programs in all formats of a cell."""
+    kinds = {entry.kind for entry in run.cell.controllers.values()}
+    forms = [form for form in ESCAPES if DIALECTS[form].kinds & kinds]
+    return {form: escape_programs(run, form, choice or Choice(), shared=shared) for form in forms}
 
 
-@pytest.mark.parametrize("cell", ["in_turn", "three"])
+@pytest.mark.parametrize("cell", ["in_turn", "elsewhere", "paced", "three"])
 def test_all_robots_come_home_from_random_stops_and_keep_their_distance_by_brute_force(
     cell: str, request: pytest.FixtureRequest
 ) -> None:
     run: VerifiedRun = request.getfixturevalue(cell)
     shared = request.getfixturevalue("shared") if cell == "in_turn" else Shared(run)
-    escapes = request.getfixturevalue("escapes") if cell == "in_turn" else escapes_of(run, shared)
+    choice = Choice(moves=Moves.LINEAR, promise=Promise.PACED) if cell == "paced" else None
+    escapes = request.getfixturevalue("escapes") if cell == "in_turn" else escapes_of(run, shared, choice)
     places, rng, smallest = RunPlaces.of(run), np.random.default_rng(11), np.inf
     stretches, routes = shared.orders()[0].stretches, next(iter(escapes.values())).routes
     programs = {name: (form, program) for form, one in escapes.items() for name, program in one.programs.items()}
@@ -105,11 +158,12 @@ def test_all_robots_come_home_from_random_stops_and_keep_their_distance_by_brute
         near = {pair.names: pair.begin - pair.slack for pair, _ in route.recovery.judgement.apart}
         for _ in range(STOPS):
             robots = {}
-            for name, (form, program) in programs.items():
-                step = program.steps[route.number - 1]
-                row = int(rng.integers(step.first, step.last))
-                q = program.rows[row - 1] + rng.uniform() * (program.rows[row] - program.rows[row - 1])
-                files = {p: t for p, t in escapes[form].escape_files.items() if p.startswith(name)}
+            for name, (form, _) in programs.items():
+                rows = escapes[form].main.robots[name]
+                row = int(rng.integers(*rows.marks[route.number - 1 : route.number + 1]))
+                q = rows.q[row] + rng.uniform() * (rows.q[row + 1] - rows.q[row])
+                q += 0.0 if rows.tube is None else rng.uniform(-1.0, 1.0, len(q)) * rows.tube[row, 2:]
+                files = {p: t for p, t in escapes[form].escape_files.items() if p.lower().startswith(name)}
                 here = exact_numbers(run.cell.robot(name), q[None], angle=angles[name])[0]
                 robots[name] = Robot(files, route.number, here, float(rng.uniform(0.0, 2.0)))
 
@@ -223,6 +277,36 @@ def test_a_mark_without_a_way_home_is_named_with_its_phase_and_pair(in_turn: Ver
         homewards(farther, shared.orders()[0])
 
 
+@pytest.mark.parametrize("moves", [Moves.JOINTS, Moves.LINEAR])
+def test_one_robot_goes_home_from_any_place_of_its_program(moves: Moves, tmp_path: Path) -> None:
+    (tmp_path / "cell.yaml").write_text(ONE, encoding="utf-8")
+    solve_into(tmp_path / "cell.yaml", tmp_path / "run")
+    run, rng = open_gate(tmp_path / "run"), np.random.default_rng(13)
+    promise = Promise.PACED if moves is Moves.LINEAR else None
+    written = escape_programs(run, "krl", Choice(moves=moves, promise=promise))
+    robot, rows = run.cell.robots[0], written.main.robots["left"]
+    off = 1e-4 + np.radians(float(written.programs["left"].steps[0].off))
+    along = np.diff(rows.q, axis=0)
+
+    assert all("cell_step" not in text for text in written.files.values())
+    for _ in range(STOPS):
+        row = int(rng.integers(len(rows) - 1))
+        q = rows.q[row] + rng.uniform() * (rows.q[row + 1] - rows.q[row])
+        q += 0.0 if rows.tube is None else rng.uniform(-1.0, 1.0, len(q)) * rows.tube[row, 2:]
+        player = Robot(written.escape_files, 0, exact_numbers(robot, q[None])[0])
+
+        def seen(player: Robot = player) -> None:
+            gaps = from_numbers(robot, player.q[None])[0] - rows.q[:-1]
+            shares = np.clip(np.sum(gaps * along, axis=1) / np.maximum(np.sum(along**2, axis=1), 1e-12), 0.0, 1.0)
+            assert np.linalg.norm(gaps - shares[:, None] * along, axis=1).min() < off  # it stays on its path
+
+        play({"left": player}, {}, rng, seen)
+        assert player.is_done
+        np.testing.assert_allclose(from_numbers(robot, player.q[None])[0], run.motion.q[0], atol=2e-4)
+
+
 def test_formats_without_escape_programs_are_refused(in_turn: VerifiedRun) -> None:
-    with pytest.raises(InputError, match=r"^--escape: expected one of the formats krl, rapid, urscript, got csv"):
+    with pytest.raises(
+        InputError, match=r"^--escape: expected one of the formats fanuc_ls, krl, rapid, urscript, val3, got csv"
+    ):
         escape_programs(in_turn, "csv", Choice())

@@ -165,5 +165,6 @@ def _choice(options: ExportOptions) -> "Choice":
     for name, word, known in (("moves", options.moves, moves), ("promise", options.promise, promises)):
         if word not in known:
             raise InputError(f"--{name}: expected one of {', '.join(filter(None, known))}, got '{word}'")
-    promise = promises[options.promise or ("sequence" if options.escape else None)]
+    usual = ("paced" if moves[options.moves] is not Moves.JOINTS else "sequence") if options.escape else None
+    promise = promises[options.promise or usual]
     return options.to(Choice, moves=moves[options.moves], promise=promise, steps=options.escape)

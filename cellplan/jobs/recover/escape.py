@@ -17,7 +17,7 @@ from cellplan.jobs.recover.programs import WITHIN
 from cellplan.jobs.recover.recover import Recovery, recover
 from cellplan.jobs.recover.state import RunPlaces
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report.exported import ProgramRows, Promise
+from cellplan.model.report.exported import ProgramRows, Promise, RobotRows
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.dialects import ESCAPES
 from cellplan.programs.elements.dialect import Dialect
@@ -32,11 +32,12 @@ from cellplan.programs.export.program import exporter_of, write_export
 from cellplan.programs.export.record import Record, export_record
 from cellplan.programs.export.stored import StoredExport, refuse_other_run
 from cellplan.programs.export.verify_export import VerifiedExport
-from cellplan.programs.export.written import read_files, write
-from cellplan.programs.promises.orders import Orders
+from cellplan.programs.export.written import write
+from cellplan.programs.promises.orders import Orders, OrderStretch
 from cellplan.programs.promises.promises import waits
-from cellplan.programs.rows.margins import corner_vectors
+from cellplan.programs.rows.margins import corner_vectors, row_tube
 from cellplan.programs.rows.thin import bends
+from cellplan.programs.seams.executed import BENDS
 from cellplan.programs.shared import Shared
 
 OFF: Final = 0.1  # [deg] or [mm] that a robot may stand off its rows, beside what rounding puts it off
@@ -70,9 +71,13 @@ class WrittenEscape:
 def homewards(run: VerifiedRun, orders: Orders, progress: Progress = silent) -> tuple[Homeward, ...]:
     """The way home from each mark but the last one, with every order of the robots between two waits certified.
 
-    A ``NotVerifiedError`` has the step and its phase where there is none, with the robots or bodies that bar it.
+    Raises:
+        InputError: A robot by itself has a part only for some time: its rows alone do not say whether it has it.
+        NotVerifiedError: There is none; with the step and its phase, and the robots or bodies that bar it.
     """
     places, routes = RunPlaces.of(run), list[Homeward]()
+    if len(run.cell.robots) == 1 and len({places.lying_at(place) for place in range(len(places.phases))}) > 1:
+        raise InputError("--escape: expected a part that rests, or is held throughout, in a cell of one robot")
     for number, (at, stretch) in enumerate(zip(orders.times[:-1], orders.stretches, strict=True), start=1):
         progress("planning the ways home", (number - 1) / len(orders.stretches))
         where = f"no way home from step {number}, '{stretch.phase}' from {at:g} s: "
@@ -102,8 +107,8 @@ def escape_programs(
         raise ValueError(f"{form}: expected a format with escape programs")
     prepared = prepare(run, dialect, choice, shared=shared, progress=progress)
     written = write(run, prepared, progress=progress)
-    (main,) = read_files(prepared, written.files)
-    (orders,) = prepared.orders
+    (main,) = written.judgement.executed
+    (orders,) = prepared.orders or (_one_stretch(run),)
     with without_cache():
         routes = shared.once("homewards", lambda: homewards(run, orders, progress))
         programs = _programs(run, prepared, escape, main, routes)
@@ -173,7 +178,9 @@ def escape_findings(
     places, read = RunPlaces.of(run), dict[str, EscapeProgram]()
     for name, expected in programs.items():
         read[name] = program = read_escape(form, expected, files[name])
-        if not np.array_equal(program.rows, main.robots[name].q):
+        rows = main.robots[name]
+        off = np.abs(program.rows - rows.q[_rows_back(rows)]) if len(program.rows) == len(expected.rows) else np.inf
+        if np.any(off > (0.0 if rows.tube is None else WRITTEN_TOL)):
             yield f"'{name}': expected the rows of its main program, read others"
         if program.steps != expected.steps:
             yield f"'{name}': expected the steps of its main program, read others"
@@ -185,6 +192,13 @@ def escape_findings(
         tracks = _tracks(places, route, read)
         for finding in leg_findings(places, route.recovery.state, route.recovery.phases, tracks):
             yield f"step {route.number}: {finding}"
+
+
+def _one_stretch(run: VerifiedRun) -> Orders:
+    """All rows of a robot by itself, which waits for none."""
+    last = len(run.motion.times) - 1
+    stretch = OrderStretch(phase="program", place=0, first=0, last=last)
+    return Orders(program=None, stretches=(stretch,), times=(0.0, float(run.motion.times[-1])))
 
 
 def _tracks(
@@ -200,7 +214,8 @@ def _tracks(
             if robot.name in read:
                 program = read[robot.name]
                 span = program.steps[route.number - 1].legs[place] or (1, 0)
-                q = np.concatenate([at[robot.name][None], program.homeward[span[0] - 1 : span[1]]])
+                moved = program.homeward[span[0] - 1 : span[1]]
+                q = np.stack([at[robot.name], *(moved if len(moved) else [at[robot.name]])])
                 at[robot.name] = q[-1]
             by_robot[robot.name] = Track(np.linspace(0.0, 1.0, len(q)), q)
         tracks.append((leg, by_robot))
@@ -213,7 +228,9 @@ def _programs(
     """The escape program of each robot that is exported."""
     frame, cell, programs = prepared.job.frame, run.cell, dict[str, EscapeProgram]()
     for name in frame.robots:
-        marks, steps, homeward = main.robots[name].marks, list[EscapeStep](), [main.robots[name].q[:1]]
+        passed = main.robots[name]
+        marks, back = passed.marks or (0, len(passed) - 1), _rows_back(passed)
+        steps, homeward = list[EscapeStep](), [passed.q[:1]]
         for route in routes:
             rows, legs = recovery_rows(route.recovery.phases)[:, cell.columns(name)], list[tuple[int, int] | None]()
             for leg in route.legs:
@@ -223,40 +240,51 @@ def _programs(
                 legs.append((begin + 1, begin + len(moved)) if len(moved) else None)
                 homeward.append(moved)
             first, last = marks[route.number - 1], marks[route.number]
-            off = _off(prepared, main, name, slice(first, last + 1), form.angle)
-            steps.append(EscapeStep(route.number, first + 1, last + 1, off, tuple(legs)))
+            off = _off(prepared, passed, slice(first, last + 1), form.angle)
+            steps.append(EscapeStep(route.number, back.index(first) + 1, back.index(last) + 1, off, tuple(legs)))
         notes = [line[2:] for note in _notes(run, prepared, name) for line in comment(note, "#")]
         programs[name] = EscapeProgram(
             frame=frame,
             robot=name,
             notes=tuple(notes),
-            rows=main.robots[name].q,
+            rows=passed.q[back],
             homeward=np.concatenate(homeward),
             steps=tuple(steps),
         )
     return programs
 
 
-def _off(prepared: PreparedExport, main: ProgramRows, name: str, rows: slice, angle: Angle) -> str:
-    """How far a robot may stand off some of its rows, in the units of the program: with all that rounding may do."""
-    written, read = prepared.job.programs[0].robots[name], main.robots[name]
-    shares: Array = np.zeros(len(read)) if read.rounding is None else ROUNDED_OFF * read.rounding
-    robot = prepared.job.frame.robot(name)
-    numbers = [
-        exact_numbers(robot, q, angle=angle)
-        for q in (read.q, read.q + corner_vectors(replace(written, q=read.q), shares))
-    ]
+def _rows_back(rows: RobotRows) -> list[int]:
+    """Rows along which a robot goes back: all that were read, and on seams those between which joints move evenly."""
+    is_inner = np.zeros(len(rows), dtype=bool)
+    if rows.tube is not None:
+        on_seam = np.any(rows.tube[:, 2:] > 0.0, axis=1)
+        is_inner[1:-1] = on_seam[:-1] & on_seam[1:]
+    return bends(rows.q, BENDS, needed=[*np.flatnonzero(~is_inner).tolist(), *rows.marks])
+
+
+def _off(prepared: PreparedExport, rows: RobotRows, stretch: slice, angle: Angle) -> str:
+    """How far a robot may stand off some of its rows, in the units of the program: by rounding, and in its tube."""
+    timed = replace(prepared.job.programs[0].robots[rows.robot], q=rows.q) if rows.times is None else rows
+    shares: Array = np.zeros(len(rows)) if rows.rounding is None else ROUNDED_OFF * rows.rounding
+    robot, count = prepared.job.frame.robot(rows.robot), rows.q.shape[1]
+    numbers = [exact_numbers(robot, q, angle=angle) for q in (rows.q, rows.q + corner_vectors(timed, shares))]
+    units = [exact_numbers(robot, q, angle=angle) for q in (np.eye(count), np.zeros((count, count)))]
+    tube = row_tube(rows) @ np.abs(units[0] - units[1])
     least, decimals = (OFF_RADIANS, 6) if angle is Angle.RADIANS else (OFF, 4)
-    rounding = np.linalg.norm(numbers[1] - numbers[0], axis=1)[rows].max(initial=0.0)
-    return f"{least + rounding:.{decimals}f}"
+    off = (np.linalg.norm(numbers[1] - numbers[0], axis=1) + np.linalg.norm(tube, axis=1))[stretch]
+    return f"{least + off.max(initial=0.0):.{decimals}f}"
 
 
 def _notes(run: VerifiedRun, prepared: PreparedExport, robot: str) -> Iterator[str]:
     """Notes for the head of an escape program."""
     yield f"cell {run.cell.name}, escape program to {prepared.dialect.name}"
-    yield "from between two marks back along the rows to the first of them, then home"
-    yield "start it on all robots; step registers that differ by one keep them from moving"
-    yield "all robots then stand at a mark: set the larger number on all controllers"
+    if len(run.cell.robots) == 1:
+        yield "from any of its rows back along these to the first one, then home"
+    else:
+        yield "from between two marks back along the rows to the first of them, then home"
+        yield "start it on all robots; step registers that differ by one keep them from moving"
+        yield "all robots then stand at a mark: set the larger number on all controllers"
     yield "every row is a stop"
     yield f"run {run.digest}"
     yield READ_BACK

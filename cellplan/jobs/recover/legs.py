@@ -71,12 +71,12 @@ def leg_findings(
 
     Args:
         phases: What is done; of these only kinds, robots and scenes are used.
-        tracks: Every leg with what each robot of the cell passes in it.
+        tracks: Every leg with what each robot of the cell passes in it, two rows at least.
     """
     cell, grids = places.cell, dict[int, list[Array]]()
     for leg, by_robot in tracks:
         grids.setdefault(leg.phase, []).append(_on_one_clock(cell, by_robot))
-        q = {name: np.repeat(track.q, 2, axis=0) if len(track.q) < 2 else track.q for name, track in by_robot.items()}
+        q = {name: track.q for name, track in by_robot.items()}
         scene, phase = scene_of(phases[leg.phase], places, state), phases[leg.phase]
         regions = [
             ClockRegion(first=one, second=two, rectangles=np.array([[0.0, len(q[one]) - 1.0, 0.0, len(q[two]) - 1.0]]))

@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,13 +20,14 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows
+from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step, task_group
-from cellplan.programs.elements.joints import Angle, from_numbers
+from cellplan.programs.elements.joints import Angle, Axes, from_numbers
+from cellplan.programs.elements.paced import Events
 
 REGISTER: Final = "cell_step"  # name of a step register where the cell states none
-NUMBERED: Final = {"ur": "24"}  # by kind of controller, its number where registers have no names
+NUMBERED: Final = {"fanuc": "81", "ur": "24"}  # by kind of controller, its number where registers have no names
 SPEED: Final = 10  # [%] of the top speed
 
 
@@ -61,7 +63,7 @@ class EscapeForm:
     """How a language writes escape programs, and the step register in main programs."""
 
     sign: str  # of a comment
-    case: str  # statements with their fields in braces: where a step begins
+    case: str  # statements with their fields in braces, of which any may name the program: where a step begins
     back: str
     go: str
     meet: str
@@ -69,37 +71,75 @@ class EscapeForm:
     pause: str  # longer than signals take
     register: str
     tables: tuple[str, str]  # what a line with the beginning of the rows of the program holds, and of those home
-    row: str  # pattern of a row, with its numbers as the only group
-    numbers: Callable[[Robot, str], Sequence[float]]  # numbers of the joints of a row, in the order of the model
+    row: str  # pattern of a line with numbers of a row, which are its only group
+    numbers: Callable[[Robot, str], Sequence[float]]  # the numbers: of an arm, then of the axes before it
     angle: Angle
-    instruction: Callable[[HandshakeStep], Sequence[str]]  # lines of an instruction of a handshake
+    events: Callable[[ExportFrame, str], Events]  # what stands between the moves of a main program
     sources: Callable[[ExportFrame, str], str]  # pattern of the paths of a main program that hold its marks
     render: Callable[[EscapeProgram], dict[str, str]]
     require: Callable[[ExportFrame, str], None]  # refuses a register that the language does not take
+    program: Callable[[ExportFrame, str], str] = lambda _frame, _robot: ""  # what statements name the program
+    scope: str = ""  # before the register in escape programs
+    # line of a main program behind which the register is declared, and the declaration; empty where none is needed
+    declaration: tuple[str, str] = ("", "")
+    plain: Callable[[str], str] = str.strip  # statement of a line
+    line: str = "{}"  # of a main program, with the statement in braces
+    layout: Callable[[str], str] = str  # text of a main program whose lines may be others than before
+    following: str = "{name}+1"  # number that follows that in the register
 
-    def calls(self, step: EscapeStep, register: str) -> Iterator[str]:
+    def calls(self, program: EscapeProgram, step: EscapeStep) -> Iterator[str]:
         """Statements of a step, from its begin. None is known any more as soon as one robot may be on its way home."""
+        name = self.program(program.frame, program.robot)
         yield self.case.format(number=step.number)
-        yield self.agree[step.number % 2]
-        yield self.back.format(first=step.first, last=step.last, off=step.off)
-        yield self.meet
-        yield self.register.format(name=register, value=0)
+        yield self.agree[step.number % 2].format(program=name)
+        yield self.back.format(first=step.first, last=step.last, off=step.off, program=name)
+        yield self.meet.format(program=name)
+        yield self.set_register(program, 0)
         for leg in step.legs:
             if leg is not None:
-                yield self.go.format(first=leg[0], last=leg[1])
-            yield self.meet
+                yield self.go.format(first=leg[0], last=leg[1], program=name)
+            yield self.meet.format(program=name)
+
+    def before(self, program: EscapeProgram) -> list[str]:
+        """Statements before anything moves: processes end; a robot by itself has one step, and keeps no register."""
+        frame, robot, process = program.frame, program.robot, self.events(program.frame, program.robot).form
+        tasks = [task.name for task in frame.cell.tasks if task.robot == robot]
+        off = list[str]()
+        if process is not None and frame.promise is Promise.PACED:
+            lines = (process.lines(False, task, ahead=ahead) for ahead in (False, True) for task in tasks)
+            off = list(dict.fromkeys(chain.from_iterable(lines)))
+        if not handshake_steps(frame, robot):
+            return [*off, self.set_register(program, program.steps[0].number)]
+        return [*off, *self.lines(frame, robot, [lowering_step(frame, robot)])]
+
+    def set_register(self, program: EscapeProgram, number: int) -> str:
+        """The statement of an escape program that sets its register."""
+        name = self.program(program.frame, program.robot)
+        return f"{self.scope}{self.register}".format(name=program.register, value=number, program=name)
+
+    def lines(self, frame: ExportFrame, robot: str, steps: Sequence[HandshakeStep | None]) -> list[str]:
+        """Lines of instructions of a handshake; None for a pause, which is all that a robot by itself does."""
+        signal = self.events(frame, robot).signal
+        texts = [self.pause if step is None else signal(step) for step in steps or (None,)]
+        return [line.strip() for text in texts for line in text.split("\n")]
 
     def waits(self, frame: ExportFrame, robot: str) -> Iterator[tuple[str, list[str]]]:
         """Routines in which robots wait for one another: statement that calls each, and its lines."""
-        yield self.meet, [line for step in handshake_steps(frame, robot) for line in self.instruction(step)]
-        for is_odd, name in enumerate(self.agree):
-            steps = agreement_steps(frame, robot, is_odd=bool(is_odd))
-            yield name, [line for step in steps for line in ([self.pause] if step is None else self.instruction(step))]
+        name = self.program(frame, robot)
+        plans: list[Sequence[HandshakeStep | None]] = [handshake_steps(frame, robot)]
+        plans += [agreement_steps(frame, robot, is_odd=is_odd) for is_odd in (False, True)]
+        for call, steps in zip((self.meet, *self.agree), plans, strict=True):
+            yield call.format(program=name), self.lines(frame, robot, steps)
 
 
 def agreement_steps(frame: ExportFrame, robot: str, *, is_odd: bool) -> list[HandshakeStep | None]:
-    """Instructions by which robots find out whether all have even or all odd numbers; None for a pause."""
+    """Instructions by which robots find out whether all have even or all odd numbers; None for a pause.
+
+    None at all for a robot by itself.
+    """
     steps, leads = handshake_steps(frame, robot), robot == frame.cell.robots[0].name
+    if not steps:
+        return []
     raised, lowered = ([step for step in steps if step.waits and step.is_on is is_on] for is_on in (True, False))
     raising, lowering = (next(s for s in steps if not s.waits and s.is_on is is_on) for is_on in (True, False))
     if is_odd is not leads:
@@ -125,32 +165,32 @@ def with_register(dialect: Dialect, form: EscapeForm) -> Dialect:
         return _with_steps(form, job.frame, dialect.render(job))
 
     def read(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
-        statement = _pattern(form.register)
+        kinds = form.register, form.register.replace("{value}", form.following), form.declaration[1]
+        statements = [_pattern(statement) for statement in kinds if statement]
         plain, blank = dict[str, str](), dict[str, str]()
         for path, text in files.items():
             lines = text.split("\n")
-            is_step = [bool(statement.fullmatch(line.strip())) for line in lines]
+            is_step = [any(one.fullmatch(form.plain(line)) for one in statements) for line in lines]
             plain[path] = "\n".join(line for line, step in zip(lines, is_step, strict=True) if not step)
             blank[path] = "\n".join(
                 line[len(line.rstrip("\r")) :] if step else line for line, step in zip(lines, is_step, strict=True)
             )
         for path, text in _with_steps(form, frame, plain).items():
-            require_same(path, text, files[path])
+            require_same(path, text, form.layout(files[path]))
         return dialect.read(frame, blank)
 
     def demands(frame: ExportFrame, rows: int) -> Iterator[Callable[[], object]]:
-        yield partial(_require_marks, frame)
+        yield partial(_require_one_program, frame)
         yield from (partial(form.require, frame, robot) for robot in frame.robots)
         yield from dialect.demands(frame, rows)
 
     return replace(dialect, render=render, read=read, demands=demands, sets_steps=True)
 
 
-def _require_marks(frame: ExportFrame) -> None:
-    """Refuse cells in which robots do not wait for one another in one program."""
-    if len(frame.cell.robots) < 2 or frame.programs != (None,):
-        got = f"{len(frame.cell.robots)} robots and {len(frame.programs)} programs"
-        raise InputError(f"--escape: expected robots that wait for one another in one program from home, got {got}")
+def _require_one_program(frame: ExportFrame) -> None:
+    """Refuse cells whose run is not one program, and robots that wait for one another without wires."""
+    if frame.programs != (None,):
+        raise InputError(f"--escape: expected one program from home to home, got {len(frame.programs)} programs")
     for group in filter(None, (task_group(frame, robot.name) for robot in frame.cell.robots)):
         raise InputError(
             f"robots.{group[0]}.controller.handshake: expected the inputs that {', '.join(map(repr, group[1:]))} set, "
@@ -166,7 +206,7 @@ def read_escape(form: EscapeForm, expected: EscapeProgram, files: Mapping[str, s
     robot = expected.frame.robot(expected.robot)
     reader, notes = _EscapeReader(form, robot), list[str]()
     for place, (path, text) in enumerate(files.items()):
-        for number, line in enumerate(map(str.strip, text.split("\n")), start=1):
+        for number, line in enumerate(map(form.plain, text.split("\n")), start=1):
             if line.startswith(form.sign):
                 notes += [] if place else [line.removeprefix(form.sign).strip()]
                 continue
@@ -175,7 +215,7 @@ def read_escape(form: EscapeForm, expected: EscapeProgram, files: Mapping[str, s
             except (ValueError, IndexError):
                 raise InputError(f"{path}:{number}: expected plain numbers, got {line[:60]!r}") from None
     rows, homeward = (
-        from_numbers(robot, np.array(table, dtype=float).reshape(-1, len(robot.model.joints)), angle=form.angle)
+        from_numbers(robot, np.array(table, dtype=float).reshape(-1, len(reader.order)), angle=form.angle)
         for table in reader.tables
     )
     read = replace(expected, notes=tuple(notes), rows=rows, homeward=homeward, steps=tuple(reader.steps))
@@ -188,25 +228,34 @@ class _EscapeReader:
     """Rows and steps as they are found line by line.
 
     Attributes:
-        tables: Numbers of the rows of the program, and of those home.
+        order: Joints in the order in which the numbers of a row stand: those of an arm first.
+        tables: Numbers of the rows of the program, and of those home, in the order of the model.
         steps: The steps so far.
     """
 
     def __init__(self, form: EscapeForm, robot: Robot) -> None:
         """Begin with nothing."""
         self._form, self._robot = form, robot
-        self._patterns = [_pattern(statement) for statement in (form.case, form.back, form.go)]
+        self._patterns = [_pattern(statement) for statement in (form.case, form.back, form.go, form.meet)]
+        self.order = [*Axes.of(robot).arm, *Axes.of(robot).external]
         self.tables: tuple[list[Sequence[float]], list[Sequence[float]]] = ([], [])
         self.steps: list[EscapeStep] = []
+        self._row = list[float]()  # numbers of a row that goes on in the next line
         self._table, self._waits = 0, 0
         self._leg: tuple[int, int] | None = None
 
     def take(self, line: str) -> None:
         """Take in what a line holds; a ``ValueError`` or ``IndexError`` where its numbers are none."""
         self._table = next((at for at, begin in enumerate(self._form.tables) if begin in line), self._table)
-        case, back, go = (pattern.fullmatch(line) for pattern in self._patterns)
+        case, back, go, meet = (pattern.fullmatch(line) for pattern in self._patterns)
         if row := re.fullmatch(self._form.row, line):
-            self.tables[self._table].append(self._form.numbers(self._robot, row[1]))
+            self._row += self._form.numbers(self._robot, row[1])
+            if len(self._row) >= len(self.order):
+                values = dict(zip(self.order, self._row, strict=True))
+                self.tables[self._table].append([values[joint] for joint in range(len(values))])
+                self._row = []
+        elif self._row:
+            raise ValueError(line)
         elif case:
             self.steps.append(EscapeStep(int(case["number"]), 0, 0, "", ()))
             self._waits, self._leg = 0, None
@@ -215,7 +264,7 @@ class _EscapeReader:
             self.steps[-1] = step
         elif go:
             self._leg = int(go["first"]), int(go["last"])
-        elif line == self._form.meet and self.steps:
+        elif meet and self.steps:
             legs = (*self.steps[-1].legs, self._leg) if self._waits else ()
             self.steps[-1] = self.steps[-1]._replace(legs=legs)
             self._waits, self._leg = self._waits + 1, None
@@ -232,25 +281,48 @@ def require_same(path: str, expected: str, got: str) -> None:
 
 
 def _pattern(statement: str) -> re.Pattern[str]:
-    """A statement with any numbers in its fields."""
-    return re.compile(re.sub(r"\\{(\w+)\\}", r"(?P<\1>\\w[\\w.]*)", re.escape(statement)))
+    """A statement with any names and numbers in its fields."""
+    named = re.sub(r"\\{(name|program)\\}", r"\\w+", re.escape(statement.strip()))
+    return re.compile(re.sub(r"\\{(\w+)\\}", r"(?P<\1>[0-9.]+)", named))
 
 
 def _with_steps(form: EscapeForm, frame: ExportFrame, files: Mapping[str, str]) -> dict[str, str]:
-    """Files of main programs with their step registers: 0 before the first motion, then the number of each mark."""
+    """Files of main programs with their step registers: 0 before the first motion, then the number of each mark.
+
+    In paced programs it is counted up, as routines of seams do not stand in the order in which they are called.
+    """
     result = dict(files)
-    for robot in frame.robots:
-        steps, register, number = handshake_steps(frame, robot), register_of(frame, robot), -1
-        first, half = form.instruction(lowering_step(frame, robot)), form.instruction(steps[len(steps) // 2 - 1])
-        sources = form.sources(frame, robot)
+    for robot in frame.robots if len(frame.cell.robots) > 1 else ():
+        name, number, sources = register_of(frame, robot), 0, form.sources(frame, robot)
         for path in sorted(path for path in files if re.fullmatch(sources, path)):
             lines, texts = list[str](), files[path].split("\n")
-            for at, line in enumerate(texts, start=1):
+            places = _places(form, frame, robot, [*map(form.plain, texts)])
+            for place, line in enumerate(texts):
                 lines.append(line)
-                anchor = first if number < 0 else half
-                if [text.strip() for text in texts[max(at - len(anchor), 0) : at]] == list(anchor):
-                    number += 1
+                if place in places:
+                    number += places[place] == 1
+                    value = form.following.format(name=name) if frame.promise is Promise.PACED else str(number)
+                    statement = form.declaration[1] if places[place] == 2 else form.register
+                    text = form.line.format(statement.format(name=name, value=value if places[place] else "0"))
                     indent, end = line[: len(line) - len(line.lstrip())], line[len(line.rstrip("\r")) :]
-                    lines.append(f"{indent}{form.register.format(name=register, value=number)}{end}")
-            result[path] = "\n".join(lines)
+                    lines.append(f"{indent}{text}{end}")
+            result[path] = form.layout("\n".join(lines))
     return result
+
+
+def _places(form: EscapeForm, frame: ExportFrame, robot: str, lines: Sequence[str]) -> dict[int, int]:
+    """Lines behind which a statement is added: 0 where a program begins, 1 at a mark, 2 where data are declared."""
+    steps = handshake_steps(frame, robot)
+    whole, half = (form.lines(frame, robot, part) for part in (steps, steps[: len(steps) // 2]))
+    first, places, line = form.lines(frame, robot, [lowering_step(frame, robot)]), dict[int, int](), 0
+    while line < len(lines):
+        if lines[line : line + len(whole)] == whole:
+            places[line + len(half) - 1] = 1
+            line += len(whole)
+            continue
+        if lines[line : line + len(first)] == first:
+            places[line + len(first) - 1] = 0
+        if lines[line] and lines[line] == form.declaration[0]:
+            places[line] = 2
+        line += 1
+    return places

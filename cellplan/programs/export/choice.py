@@ -28,7 +28,7 @@ class Choice:
             what is usual.
         thin_deg: How far a turning joint may be off in [deg], likewise.
         promise: What is to be promised; None for the best that holds.
-        steps: Whether programs set their step register at marks; with the promise ``sequence only``.
+        steps: Whether programs set their step register at marks, at which they wait for others.
     """
 
     robots: tuple[str, ...] = ()
@@ -58,8 +58,8 @@ class Choice:
             raise InputError(f"--promise: expected paced or synchronised with --moves linear, got {self.promise}")
         if self.promise is not None and self.promise not in dialect.promises:
             raise InputError(f"--promise: expected {listed(dialect.promises)} with {dialect.name}, got {self.promise}")
-        if self.steps and self.promise is not Promise.SEQUENCE_ONLY:
-            raise InputError(f"--escape: expected --promise sequence or none, got {self.promise}")
+        if self.steps and self.promise not in {Promise.PACED, Promise.SEQUENCE_ONLY}:
+            raise InputError(f"--escape: expected --promise paced, sequence or none, got {self.promise}")
         if self.split is not None and dialect.split is None:
             raise InputError(f"--split: expected no --split with {dialect.name}, whose files have no limit")
         if self.split is not None and not LEAST_SPLIT <= self.split <= (dialect.split or 0):

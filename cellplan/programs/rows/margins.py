@@ -87,11 +87,16 @@ def robot_corners(played: ExecutedProgram) -> dict[str, Array]:
     """
     corners = {}
     for name in played.exported:
-        rows = played.rows[name]
-        corners[name] = np.abs(corner_vectors(rows, played.shares[name]))
-        if rows.tube is not None:
-            corners[name] += np.max([np.pad(rows.tube[:, 2:], ends) for ends in (FIRST, LAST)], axis=0)
+        corners[name] = np.abs(corner_vectors(played.rows[name], played.shares[name])) + row_tube(played.rows[name])
     return corners
+
+
+def row_tube(rows: RobotRows) -> Array:
+    """How far a robot may be off at its rows in its tube, in [rad] or [m], shape (N, n)."""
+    if rows.tube is None:
+        return np.zeros_like(rows.q)
+    tube: Array = np.max([np.pad(rows.tube[:, 2:], ends) for ends in (FIRST, LAST)], axis=0)
+    return tube
 
 
 def tubes_at(played: ExecutedProgram, times: Array) -> dict[str, Array]:

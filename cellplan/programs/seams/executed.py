@@ -36,6 +36,8 @@ BENT: Final = 2.0  # [-] of what joints are off a line in the middle of a step: 
 RESERVE: Final = 1.2  # [-] of a Jacobian that changes within the tube
 EDGE: Final = 2e-5  # [rad] from the edge of a configuration within which either of its sides is right
 SPEED_TOL: Final = 1e-3  # [-] of a speed limit
+BENDS: Final = 2e-4  # [rad] or [m] that joints of escape programs may be off their rows where they go back a seam
+SLACK: Final = 3e-4  # [rad] or [m] the same with the rounding of numbers, for which bodies are judged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -228,7 +230,8 @@ class SeamExecution:
         rules = shape.rule_margins(shares)
         tool = np.stack([BENT * off, BENT * turned + np.maximum(rules[:-1], rules[1:])], axis=1)
         judged = tool + np.array([self._form.tube if is_on and self._form else 0.0, 0.0])
-        return np.concatenate([tool, self._joints_off(judged, q)], axis=1)
+        slack = SLACK if self._dialect.sets_steps else 0.0
+        return np.concatenate([tool, self._joints_off(judged, q) + slack], axis=1)
 
     def _joints_off(self, tool: Array, q: Array) -> Array:
         """How far joints may be off in each step for what a tool is, shape (M - 1, 2), shape (M - 1, n)."""

@@ -1,15 +1,20 @@
 """Escape programs: what is written is read back, nothing else is read, and what a controller makes of the texts."""
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise, product
 
 import numpy as np
 import pytest
 from builders.escape_players import Robot, play
-from builders.export_jobs import cell_of, controlled, two_arms
+from builders.export_jobs import cell_of, controlled, one_arm, random_program, two_arms, zero_of
+from builders.fanuc_jobs import counted, waiting_job
+from builders.fanuc_jobs import seam_job as fanuc_seam_job
 from builders.rapid_jobs import sequence_job
 from builders.scene_builders import arm_model
+from builders.seam_jobs import KUKA_ZERO, STAUBLI_VALVE, UR_VALVE, VALVE, seam_job
 
 from cellplan.errors import InputError, refusals
 from cellplan.model.report.exported import ExportFrame, ExportJob, Promise
@@ -18,14 +23,20 @@ from cellplan.programs.dialects import DIALECTS, ESCAPES
 from cellplan.programs.elements.escapes import EscapeProgram, EscapeStep, read_escape, with_register
 from cellplan.programs.elements.joints import from_numbers, to_numbers
 
-FORMS = ("krl", "rapid", "urscript")
+KINDS = {"fanuc_ls": "fanuc", "krl": "kuka", "rapid": "abb", "urscript": "ur", "val3": "staubli"}
+FORMS = tuple(KINDS)
 
 
 def job_in(form: str) -> ExportJob:
     """A program of two robots that meet at three marks."""
     if form != "urscript":
-        return two_arms("kuka", seed=3) if form == "krl" else sequence_job(seed=3)
-    job = two_arms("ur", seed=3)
+        jobs = {"rapid": sequence_job, "fanuc_ls": waiting_job}
+        return jobs.get(form, partial(two_arms, KINDS[form]))(seed=3)
+    return with_few_signals(two_arms("ur", seed=3))
+
+
+def with_few_signals(job: ExportJob) -> ExportJob:
+    """The job of two robots whose signals are standard ones of UR."""
     wires = {"alpha": (1, {"beta": 2}), "beta": (3, {"alpha": 4})}
     signals = {name: HandshakeEntry(output=output, inputs=inputs) for name, (output, inputs) in wires.items()}
     robots = tuple(
@@ -63,7 +74,8 @@ def test_programs_set_their_register_at_each_mark_and_are_read_with_these_number
     (read,) = dialect.read(job.frame, files)
     (expected,) = plain.read(job.frame, plain.render(job))
 
-    setting = re.compile(r"^ *(?:cell_step ?:?= ?|write_output_integer_register\(24, )(\d)[;)]?\r?\n", re.MULTILINE)
+    begin = r"(?:cell_step ?:?= ?|write_output_integer_register\(24, | *\d+:  R\[81\]=)"
+    setting = re.compile(rf"^ *{begin}(\d)(?: ?;|\))?\r?\n", re.MULTILINE)
     for name, rows in expected.robots.items():
         np.testing.assert_array_equal(read.robots[name].q, rows.q)
         assert read.robots[name].marks == rows.marks
@@ -78,6 +90,93 @@ def test_programs_set_their_register_at_each_mark_and_are_read_with_these_number
                     dialect.read(job.frame, {**files, path: text[: match.start()] + changed + text[match.end() :]})
 
 
+def paced_job(form: str) -> ExportJob:
+    """Two robots that meet at three marks: the first one works on a seam, which the second mark is in."""
+    jobs: dict[str, Callable[[], ExportJob]] = {
+        "fanuc_ls": fanuc_seam_job,
+        "krl": partial(seam_job, "kuka", process=VALVE, controller=KUKA_ZERO),
+        "urscript": partial(seam_job, "ur", process=UR_VALVE),
+        "val3": partial(seam_job, "staubli", process=STAUBLI_VALVE),
+    }
+    job = jobs[form]()
+    rows, cell = job.programs[0].robots["alpha"], job.frame.cell
+    model = replace(arm_model(), controller=cell.robot("alpha").model.controller)
+    robots = (cell.robot("alpha"), controlled("beta", model))
+    both = cell_of(*robots, kind=KINDS[form])  # type: ignore[arg-type]
+    both = replace(both, tasks=cell.tasks, controllers={**both.controllers, **cell.controllers})
+    marks = (0, 6, len(rows) - 1)
+    beta = random_program(both, rows=len(rows), marks=marks).robots["beta"]
+    program = replace(
+        job.programs[0], robots={"alpha": replace(rows, marks=marks), "beta": replace(beta, process=None)}
+    )
+    frame = replace(job.frame, cell=both, robots=("alpha", "beta"))
+    job = replace(job, frame=frame, programs=(program,))
+    return with_few_signals(job) if form == "urscript" else job
+
+
+@pytest.mark.parametrize("form", ["fanuc_ls", "krl", "urscript", "val3"])
+def test_paced_programs_count_their_register_up_at_each_mark_in_whichever_routine_it_is(form: str) -> None:
+    job, plain = paced_job(form), DIALECTS[form]
+    dialect = with_register(plain, ESCAPES[form])
+    files = dialect.render(job)
+    (read,), (expected,) = dialect.read(job.frame, files), plain.read(job.frame, plain.render(job))
+
+    counting = re.compile(r"(?:cell_step=cell_step\+1|R\[81\]=R\[81\]\+1|24, read_output_integer_register\(24\) \+ 1)")
+    beginning = re.compile(r"(?:cell_step=0|R\[81\]=0|register\(24, 0)")
+    for name, rows in expected.robots.items():
+        np.testing.assert_array_equal(read.robots[name].q, rows.q)
+        assert read.robots[name].marks == rows.marks == (0, 6, len(rows) - 1)
+        texts = [text for path, text in files.items() if path.lower().startswith(name)]
+        assert (sum(len(counting.findall(text)) for text in texts), sum(map(len, map(beginning.findall, texts)))) == (
+            3,
+            1,
+        )
+    for path, text in files.items():
+        for match in [*counting.finditer(text), *beginning.finditer(text)]:
+            begin, end = text.rindex("\n", 0, match.start()), text.index("\n", match.end())
+            for changed in ("", text[begin:end] * 2):
+                with pytest.raises(InputError, match=rf"^{path}:\d+: expected"):
+                    dialect.read(job.frame, {**files, path: text[:begin] + changed + text[end:]})
+
+
+@pytest.mark.parametrize(
+    ("form", "off"),
+    [("krl", VALVE["off"]), ("urscript", [UR_VALVE["off"]]), ("val3", STAUBLI_VALVE["off"])],
+)
+def test_processes_go_off_before_anything_moves(form: str, off: list[str]) -> None:
+    job, escape = paced_job(form), ESCAPES[form]
+    rows = job.programs[0].robots["beta"].q
+    program = EscapeProgram(frame=job.frame, robot="alpha", notes=(), rows=rows, homeward=rows[:1], steps=())
+
+    assert escape.before(program)[: len(off)] == off
+    moving = replace(program, robot="beta")
+    assert not set(off) & set(escape.before(moving))
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_robot_by_itself_keeps_no_register_and_goes_back_along_all_of_its_rows(form: str) -> None:
+    jobs = {"rapid": lambda: replace(sequence_job(seed=3)), "fanuc_ls": lambda: counted(one_arm("fanuc", seed=3))}
+    job = jobs.get(form, partial(one_arm, KINDS[form], seed=3))()
+    if len(job.frame.robots) > 1:
+        cell = replace(job.frame.cell, robots=job.frame.cell.robots[:1])
+        alone = replace(job.programs[0].robots[cell.robots[0].name], marks=())
+        program_rows = replace(job.programs[0], robots={alone.robot: alone})
+        job = replace(job, frame=replace(job.frame, cell=cell, robots=(alone.robot,)), programs=(program_rows,))
+    escape, (name,) = ESCAPES[form], job.frame.robots
+    assert with_register(DIALECTS[form], escape).render(job) == DIALECTS[form].render(job)
+    q = job.programs[0].robots[name].q
+    step = EscapeStep(1, 1, len(q), "0.1000", ((2, 4),))
+    program = EscapeProgram(frame=job.frame, robot=name, notes=(), rows=q, homeward=q[:4], steps=(step,))
+    files = escape.render(program)
+
+    assert read_escape(escape, program, files).steps == (step,)
+    numbers = numbers_of(form, job, name, q)
+    here = 0.3 * numbers[5] + 0.7 * numbers[6]
+    for register in (0, 5):  # whatever it holds
+        moves = _moves(Robot(files, register, here))
+        np.testing.assert_allclose(np.array(moves), np.array([*numbers[5::-1], *numbers[1:4]]), atol=1e-4)
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_escape_programs_are_read_back_and_every_change_is_noticed(form: str) -> None:
     job, escape, rng = job_in(form), ESCAPES[form], np.random.default_rng(5)
@@ -89,7 +188,7 @@ def test_escape_programs_are_read_back_and_every_change_is_noticed(form: str) ->
     assert (read.steps, read.notes) == (program.steps, program.notes)
     np.testing.assert_array_equal(read.rows, program.rows)
     np.testing.assert_array_equal(read.homeward, program.homeward)
-    for _ in range(150):
+    for _ in range(80):
         path = sorted(files)[int(rng.integers(len(files)))]
         lines = files[path].split("\n")
         place = int(rng.integers(len(lines) - 1))
@@ -148,9 +247,10 @@ def _distance(p: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
     return float(np.linalg.norm(p - a - share * (b - a)))
 
 
-@pytest.mark.parametrize("count", [2, 3])
-def test_robots_go_only_where_all_registers_have_even_or_all_odd_numbers(count: int) -> None:
-    cell = cell_of(*(controlled(name, arm_model()) for name in ("alpha", "beta", "gamma")[:count]), kind="kuka")
+@pytest.mark.parametrize(("form", "count", "seeds"), [("krl", 2, 8), ("krl", 3, 4), ("fanuc_ls", 2, 2), ("val3", 2, 2)])
+def test_robots_go_only_where_all_registers_have_even_or_all_odd_numbers(form: str, count: int, seeds: int) -> None:
+    model = replace(arm_model(), controller=zero_of(6)) if form == "fanuc_ls" else arm_model()
+    cell = cell_of(*(controlled(name, model) for name in ("alpha", "beta", "gamma")[:count]), kind=KINDS[form])
     names = [robot.name for robot in cell.robots]
     frame = ExportFrame(cell=cell, robots=tuple(names), programs=(None,), promise=Promise.SEQUENCE_ONLY)
     here = np.zeros((2, 6))
@@ -159,7 +259,7 @@ def test_robots_go_only_where_all_registers_have_even_or_all_odd_numbers(count: 
     files = {}
     for name in names:
         program = EscapeProgram(frame=frame, robot=name, notes=(), rows=here, homeward=here, steps=steps)
-        files[name] = ESCAPES["krl"].render(program)
+        files[name] = ESCAPES[form].render(program)
     wires: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for robot in cell.robots:
         assert robot.control is not None
@@ -170,7 +270,7 @@ def test_robots_go_only_where_all_registers_have_even_or_all_odd_numbers(count: 
             if other.control and other.control.handshake and robot.name in other.control.handshake.inputs
         ]
     stands = to_numbers(cell.robots[0], here, decimals=5)[1]
-    for seed in range(40 // count**2):
+    for seed in range(seeds):
         rng = np.random.default_rng(seed)
         for numbers in product((1, 2), repeat=count):
             spread = (0.0, 0.02, 1.0, 3.0)[seed % 4]
@@ -185,16 +285,34 @@ def test_robots_go_only_where_all_registers_have_even_or_all_odd_numbers(count: 
                 assert not any(robot.moved for robot in robots.values()), (seed, numbers)
 
 
-def test_a_register_may_have_another_name_and_none_that_the_language_has() -> None:
-    job = job_in("krl")
+@pytest.mark.parametrize(
+    ("form", "registers", "path", "expected", "refusal"),
+    [
+        ("krl", ("N_STEP", "SWITCH"), "alpha.src", "\nN_STEP=3\r", "expected a name of at most 24 characters"),
+        ("fanuc_ls", (7, 99), "ALPHA.ls", ":  R[7]=3 ;\r", "expected the number of a register, 1 to 98"),
+        ("val3", ("nAt", "diMark1"), "alpha/start.pgx", "\n  nAt=3\n", "expected a name of at most 15 characters"),
+    ],
+)
+def test_a_register_may_have_another_name_and_none_that_the_language_has(
+    form: str, registers: tuple[object, object], path: str, expected: str, refusal: str
+) -> None:
+    job = job_in(form)
     robots = tuple(
         replace(robot, control=robot.control.model_copy(update={"step_register": register}))
-        for robot, register in zip(job.frame.cell.robots, ("N_STEP", "SWITCH"), strict=True)
+        for robot, register in zip(job.frame.cell.robots, registers, strict=True)
         if robot.control is not None
     )
     frame = replace(job.frame, cell=replace(job.frame.cell, robots=robots))
-    dialect = with_register(DIALECTS["krl"], ESCAPES["krl"])
+    dialect = with_register(DIALECTS[form], ESCAPES[form])
 
-    assert "\nN_STEP=3\r" in dialect.render(replace(job, frame=frame))[f"{frame.robots[0]}.src"]
-    (refusal,) = refusals(*dialect.demands(frame, 0))
-    assert "beta.controller.step_register: expected a name of at most 24 characters, got 'SWITCH'" in str(refusal)
+    assert expected in dialect.render(replace(job, frame=frame))[path]
+    (finding,) = refusals(*dialect.demands(frame, 0))
+    assert f"beta.controller.step_register: {refusal}, got '{registers[1]}'" in str(finding)
+
+
+def test_more_rows_than_a_program_of_a_controller_has_points_are_refused() -> None:
+    job = job_in("fanuc_ls")
+    program = escape_of("fanuc_ls", job, "beta")
+
+    with pytest.raises(InputError, match=r"^--escape: expected at most 999 rows of 'beta' in fanuc_ls, got 1000: "):
+        ESCAPES["fanuc_ls"].render(replace(program, rows=np.tile(program.rows[:1], (1000, 1))))

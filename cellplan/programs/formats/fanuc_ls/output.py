@@ -80,12 +80,11 @@ def instruction(step: HandshakeStep) -> str:
     return f"WAIT DI[{step.signal}]={state}" if step.waits else f"DO[{step.signal}]={state}"
 
 
-def joint_pose(group: MotionGroup, part: PagedProgram, row: int, base: int | None = None) -> list[str]:
-    """What a point says of a group: the axes of a row, three on a line."""
-    values = part.numbers[row][list(group.order)].tolist()
+def joint_pose(group: MotionGroup, numbers: Array, decimals: int, base: int | None = None) -> list[str]:
+    """What a point says of a group: its axes as they are written, shape (n,), three on a line."""
     axes = [
-        f"{name} = {fixed(value, part.decimals)} {unit}"
-        for (name, unit), value in zip(group.axes.items(), values, strict=True)
+        f"{name} = {fixed(value, decimals)} {unit}"
+        for (name, unit), value in zip(group.axes.items(), numbers[list(group.order)].tolist(), strict=True)
     ]
     return [*_begin(group, base), *_lines(axes)]
 

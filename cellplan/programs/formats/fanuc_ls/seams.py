@@ -68,7 +68,7 @@ def write_seam(
             speed, ending = _feed(events, task.name, move), _ending(move, shares[move.row])
             motion = " ".join(["L" if move.middle is None else "C", points, speed, ending, *move.triggers])
         else:
-            point = text.point([joint_pose(group, part, move.row, number)])
+            point = text.point([joint_pose(group, part.numbers[move.row], part.decimals, number)])
             motion = f"J {point} {part.speeds[move.row]}% FINE"
         suffix = (
             ""

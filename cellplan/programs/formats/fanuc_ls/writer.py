@@ -68,7 +68,9 @@ def _texts(job: ExportJob, program: TpProgram, rows: ProgramRows) -> list[TpText
                 texts.append(seams[row])
                 text.instructions += [f"CALL {seams[row].name}", *frames(groups[0])]
                 continue
-            poses = [joint_pose(group, part, row) for group, part in zip(groups, parts, strict=True)]
+            poses = [
+                joint_pose(group, part.numbers[row], part.decimals) for group, part in zip(groups, parts, strict=True)
+            ]
             text.move(f"J {{}} {speeds[row]} {'CNT100' if passed[row] else 'FINE'}", poses)
             text.instructions += [instruction(step) for step in first.steps if row in first.rows.marks]
     return texts

@@ -7,13 +7,12 @@ from cellplan.errors import InputError
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame
 from cellplan.programs.elements.escapes import SPEED, EscapeForm, EscapeProgram, register_of
-from cellplan.programs.elements.handshake import HandshakeStep, lowering_step
 from cellplan.programs.elements.joints import Angle, Axes, to_numbers
 from cellplan.programs.elements.pages import program_paths
 from cellplan.programs.elements.text import joined
 from cellplan.programs.elements.timed_rows import decimals_of
 from cellplan.programs.formats.krl.poses import components
-from cellplan.programs.formats.krl.seams import signal_text
+from cellplan.programs.formats.krl.seams import krl_events
 from cellplan.programs.formats.krl.text import AXES, MODULES, NAME
 from cellplan.programs.formats.krl.writer import HEADER, KRL, LINE_END, frames_set
 
@@ -33,9 +32,9 @@ def render_escape(program: EscapeProgram) -> dict[str, str]:
         data.append(f"DECL E6AXIS {table}[{len(q)}]")
         data += [f"{table}[{row}]={{{components(values, decimals)}}}" for row, values in enumerate(numbers, start=1)]
     source = [*HEADER, f"DEF {name}()", *notes, *frames_set(placed)]
-    source += [signal_text(lowering_step(program.frame, program.robot)), f"BAS(#VEL_PTP,{SPEED})"]
+    source += [*KRL_ESCAPE.before(program), f"BAS(#VEL_PTP,{SPEED})"]
     source += [f"SWITCH {program.register}"]
-    source += [line for step in program.steps for line in KRL_ESCAPE.calls(step, program.register)]
+    source += [line for step in program.steps for line in KRL_ESCAPE.calls(program, step)]
     source += ["DEFAULT", "NOWAY()", "ENDSWITCH", "END", *_back(AXES[: len(order)]), *_GO]
     for call, lines in KRL_ESCAPE.waits(program.frame, program.robot):
         source += [f"DEF {call}", *lines, "END"]
@@ -77,10 +76,8 @@ _GO: Final = (
 
 
 def _numbers(robot: Robot, text: str) -> list[float]:
-    """Numbers of a row in the order of the joints."""
-    values = [float(number) for number in re.findall(r"[AE][1-6] (-?[0-9.]+)", text)]
-    order = [*Axes.of(robot).arm, *Axes.of(robot).external]
-    return [values[order.index(joint)] for joint in range(len(order))]
+    """Numbers of a row that belong to joints."""
+    return [float(number) for number in re.findall(r"[AE][1-6] (-?[0-9.]+)", text)][: len(robot.model.joints)]
 
 
 def _sources(frame: ExportFrame, robot: str) -> str:
@@ -97,10 +94,6 @@ def _require(frame: ExportFrame, robot: str) -> None:
         )
 
 
-def _lines(step: HandshakeStep) -> list[str]:
-    return [signal_text(step)]
-
-
 KRL_ESCAPE: Final = EscapeForm(
     sign=";",
     case="CASE {number}",
@@ -114,7 +107,7 @@ KRL_ESCAPE: Final = EscapeForm(
     row=r"X[RH]\[[0-9]+\]=\{(.*)\}",
     numbers=_numbers,
     angle=Angle.DEGREES,
-    instruction=_lines,
+    events=krl_events,
     sources=_sources,
     render=render_escape,
     require=_require,

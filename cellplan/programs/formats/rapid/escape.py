@@ -7,10 +7,9 @@ from cellplan.errors import InputError
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame
 from cellplan.programs.elements.escapes import EscapeForm, EscapeProgram, register_of
-from cellplan.programs.elements.handshake import HandshakeStep, lowering_step
 from cellplan.programs.elements.joints import Angle, Axes
 from cellplan.programs.elements.text import joined
-from cellplan.programs.formats.rapid.paced import signal_text
+from cellplan.programs.formats.rapid.paced import rapid_events
 from cellplan.programs.formats.rapid.targets import joint_targets
 from cellplan.programs.formats.rapid.units import LONGEST_NAME, NAME, WORDS, RapidUnit, rapid_units
 from cellplan.programs.formats.rapid.writer import LINE_END
@@ -29,8 +28,8 @@ def render_escape(program: EscapeProgram) -> dict[str, str]:
         targets = joint_targets(unit, q)
         lines.append(f"LOCAL CONST jointtarget {table}{{{len(q)}}} := [")
         lines += [f"  {target}{',' if row < len(q) else ''}" for row, target in enumerate(targets, start=1)] + ["];"]
-    calls = [line for step in program.steps for line in RAPID_ESCAPE.calls(step, program.register)]
-    lines += [f"PROC {ROUTINE}()", f"  {signal_text(lowering_step(program.frame, program.robot))}"]
+    calls = [line for step in program.steps for line in RAPID_ESCAPE.calls(program, step)]
+    lines += [f"PROC {ROUTINE}()", *(f"  {line}" for line in RAPID_ESCAPE.before(program))]
     lines += [f"  TEST {program.register}", *(f"  {line}" for line in calls), "  DEFAULT:", "    no_way;", "  ENDTEST"]
     lines += ["ENDPROC", *_back(unit), *_moves("go", "num first,num last", "first TO last", TABLES[1], unit), "ENDPROC"]
     for call, body in RAPID_ESCAPE.waits(program.frame, program.robot):
@@ -81,12 +80,10 @@ def _unit(frame: ExportFrame, robot: str) -> RapidUnit:
 
 
 def _numbers(robot: Robot, text: str) -> list[float]:
-    """Numbers of a target in the order of the joints."""
+    """Numbers of a target that belong to joints."""
     arm, external = (part.split(",") for part in text.split("],["))
     axes = Axes.of(robot)
-    order = [*axes.external, *axes.arm]
-    values = [*external[: len(axes.external)], *(arm if axes.arm else [])]
-    return [float(values[order.index(joint)]) for joint in range(len(order))]
+    return [float(value) for value in (*(arm if axes.arm else []), *external[: len(axes.external)])]
 
 
 def _sources(frame: ExportFrame, robot: str) -> str:
@@ -104,10 +101,6 @@ def _require(frame: ExportFrame, robot: str) -> None:
         )
 
 
-def _lines(step: HandshakeStep) -> list[str]:
-    return [signal_text(step)]
-
-
 RAPID_ESCAPE: Final = EscapeForm(
     sign="!",
     case="CASE {number}:",
@@ -121,7 +114,7 @@ RAPID_ESCAPE: Final = EscapeForm(
     row=r"\[\[([-0-9.,E\]\[]+)\]\],?",
     numbers=_numbers,
     angle=Angle.DEGREES,
-    instruction=_lines,
+    events=lambda frame, robot: rapid_events(frame, _unit(frame, robot)),
     sources=_sources,
     render=render_escape,
     require=_require,

@@ -7,16 +7,14 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame
 from cellplan.programs.elements.escapes import EscapeForm, EscapeProgram, register_of
-from cellplan.programs.elements.handshake import HandshakeStep
 from cellplan.programs.elements.joints import Angle, to_numbers
 from cellplan.programs.elements.text import fixed, joined
+from cellplan.programs.formats.urscript.seams import urscript_events
 from cellplan.programs.formats.urscript.text import (
     ENDING,
     approach_call,
     decimals_of_urscript,
     function_names,
-    lowering,
-    signal_lines,
 )
 
 TABLES: Final = ("escape_rows", "homeward")
@@ -32,9 +30,9 @@ def render_escape(program: EscapeProgram) -> dict[str, str]:
     body += ["def go(first, last):", *_moves(TABLES[1], "first", "row <= last", "row + 1")]
     for call, lines in URSCRIPT_ESCAPE.waits(frame, robot):
         body += [f"def {call}:", *(f"  {line}" for line in lines), "end"]
-    body += [lowering(frame, robot), f"step = read_output_integer_register({program.register})"]
+    body += [*URSCRIPT_ESCAPE.before(program), f"step = read_output_integer_register({program.register})"]
     body += ["if step < 0:", "  no_way()"]
-    body += [line for step in program.steps for line in URSCRIPT_ESCAPE.calls(step, program.register)]
+    body += [line for step in program.steps for line in URSCRIPT_ESCAPE.calls(program, step)]
     body += ["else:", "  no_way()", "end"]
     head = [*(f"# {note}".rstrip() for note in program.notes), f"def {function_names(frame)[None, robot]}_escape():"]
     return {f"{robot}_escape{ENDING}": joined([*head, *(f"  {line}" for line in body), "end"])}
@@ -90,10 +88,6 @@ def _require(frame: ExportFrame, robot: str) -> None:
         raise InputError(f"--split: expected none with --escape in urscript, got {frame.split}")
 
 
-def _lines(step: HandshakeStep) -> list[str]:
-    return [line.strip() for line in signal_lines(step)]
-
-
 URSCRIPT_ESCAPE: Final = EscapeForm(
     sign="#",
     case="elif step == {number}:",
@@ -107,8 +101,9 @@ URSCRIPT_ESCAPE: Final = EscapeForm(
     row=r"return \[(.*)\]",
     numbers=_numbers,
     angle=Angle.RADIANS,
-    instruction=_lines,
+    events=urscript_events,
     sources=_sources,
     render=render_escape,
     require=_require,
+    following="read_output_integer_register({name}) + 1",
 )

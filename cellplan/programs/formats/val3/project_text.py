@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Final
 
-from cellplan.programs.elements.pages import PagedProgram
 from cellplan.programs.elements.text import comment, joined
 from cellplan.programs.formats.val3.xml import DATA_SPACE, PROGRAM_SPACE, PROJECT_SPACE, TYPE_SPACE
 
@@ -13,20 +12,20 @@ VERSION: Final = "s7.10.2"  # of the language, as public projects state it
 XML: Final = '<?xml version="1.0" encoding="utf-8"?>'
 
 
-def index_text(project: PagedProgram, programs: Iterable[str], libraries: Sequence[str] = ()) -> str:
+def index_text(name: str, programs: Iterable[str], *, notes: Iterable[str] = (), libraries: Sequence[str] = ()) -> str:
     """The file that lists programs and data, and libraries by their names, which are those of their projects too."""
-    listed = [f'    <Library alias="{name}" path="{name}"/>' for name in libraries]
+    listed = [f'    <Library alias="{library}" path="{library}"/>' for library in libraries]
     return joined(
         [
             XML,
             f'<Project xmlns="{PROJECT_SPACE}">',
-            *xml_comments(project.notes),
+            *xml_comments(notes),
             f'  <Parameters version="{VERSION}" stackSize="5000" millimeterUnit="true"/>',
             "  <Programs>",
             *(f'    <Program file="{program}"/>' for program in programs),
             "  </Programs>",
             "  <Database>",
-            f'    <Data file="{project.name}.dtx"/>',
+            f'    <Data file="{name}.dtx"/>',
             "  </Database>",
             *(["  <Libraries>", *listed, "  </Libraries>"] if listed else ["  <Libraries/>"]),
             "  <Types/>",
@@ -51,13 +50,14 @@ def array_lines(name: str, kind: str, values: Sequence[Mapping[str, str]]) -> li
     return [head, *rows, "    </Data>"]
 
 
-def program_text(name: str, code: Sequence[str]) -> str:
-    """A program."""
+def program_text(name: str, code: Sequence[str], declared: Iterable[str] = ()) -> str:
+    """A program, with the lines that declare its parameters and numbers of its own."""
     return joined(
         [
             XML,
             f'<Programs xmlns:xsi="{TYPE_SPACE}" xmlns="{PROGRAM_SPACE}">',
             f'  <Program name="{name}" access="public">',
+            *declared,
             "    <Code><![CDATA[begin",
             *(f"  {line}" for line in code),
             "end]]></Code>",

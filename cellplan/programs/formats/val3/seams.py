@@ -59,13 +59,13 @@ def val3_events(frame: ExportFrame, robot: str) -> Events:
     return Events(
         frame=frame,
         robot=robot,
-        signal=partial(_signal_text, names=names),
+        signal=partial(signal_text, names=names),
         wait=lambda seconds: f"delay({fixed(seconds, 3)})",
         plain=lambda text: "".join(text.replace("[0]", "").split()),
     )
 
 
-def _signal_text(step: HandshakeStep, names: Mapping[tuple[bool, str], str]) -> str:
+def signal_text(step: HandshakeStep, names: Mapping[tuple[bool, str], str]) -> str:
     """One step of a handshake."""
     name, state = names[step.waits, step.signal], "true" if step.is_on else "false"
     return f"wait({name}=={state})" if step.waits else f"{name}={state}"

@@ -5,20 +5,15 @@ from functools import partial
 from typing import Final, NamedTuple
 
 from cellplan.errors import raise_findings, refusals
-from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, ProgramRows, Promise
 from cellplan.model.units import MM
-from cellplan.programs.elements.conventions import CONVENTIONS
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.frames import on_flange
-from cellplan.programs.elements.handshake import HandshakeStep
 from cellplan.programs.elements.joints import from_numbers
 from cellplan.programs.elements.paced import moves_of
 from cellplan.programs.elements.pages import PagedProgram, paged, program_paths, render_programs, require_six_axes
 from cellplan.programs.elements.text import comment, fixed
 from cellplan.programs.formats.val3.names import (
     BASE,
-    FLANGE,
     JOINTS,
     MOVE,
     PROJECTS,
@@ -32,7 +27,15 @@ from cellplan.programs.formats.val3.names import (
 )
 from cellplan.programs.formats.val3.project_text import array_lines, data_text, index_text, program_text
 from cellplan.programs.formats.val3.reader import read_val3
-from cellplan.programs.formats.val3.seams import SeamWriter, libraries, require_seams, routine_names, val3_events
+from cellplan.programs.formats.val3.seams import (
+    SeamWriter,
+    libraries,
+    require_seams,
+    routine_names,
+    signal_text,
+    tool_values,
+    val3_events,
+)
 from cellplan.programs.formats.val3.seams_reader import read_val3_seams
 from cellplan.programs.formats.zones import on_scale, tool_zones
 
@@ -89,7 +92,9 @@ def _with_seams(job: ExportJob, program: ProgramRows, robot: str, path: str) -> 
     texts = {f"{name}.pgx": text for name, text in sorted(programs.items())}
     data = data_text(project.notes, seams.arrays())
     texts = {
-        f"{project.name}.pjx": index_text(project, texts, libraries(job.frame, robot)),
+        f"{project.name}.pjx": index_text(
+            project.name, texts, notes=project.notes, libraries=libraries(job.frame, robot)
+        ),
         f"{project.name}.dtx": data,
         **texts,
     }
@@ -105,7 +110,7 @@ def _files(project: PagedProgram) -> dict[str, str]:
     signals = signal_names(project.steps)
     pages = [f"{project.name}{ending}" for ending in project.endings]
     programs = {STOP: program_text(STOP, ["resetMotion()"])}
-    handshake = [_instruction(step, signals) for step in project.steps]
+    handshake = [signal_text(step, signals) for step in project.steps]
     moves = [
         _moves(project, page, ending, descriptors=[places[motions[row]] for row in page], handshake=handshake)
         for page, ending in zip(project.pages, project.endings, strict=True)
@@ -116,11 +121,15 @@ def _files(project: PagedProgram) -> dict[str, str]:
         code = [f"call {page}()" for page in pages]
         programs |= {page: program_text(page, page_moves) for page, page_moves in zip(pages, moves, strict=True)}
     heads = [line for note in project.notes for line in comment(note, "//", forbidden="]")]
-    first = [_instruction(step, signals) for step in project.first]
+    first = [signal_text(step, signals) for step in project.first]
     programs[START] = program_text(START, [*heads, *first, *code, "waitEndMove()"])
     files = {f"{program}.pgx": text for program, text in sorted(programs.items())}
     data = _data(project, places, signals)
-    files = {f"{project.name}.pjx": index_text(project, files), f"{project.name}.dtx": data, **files}
+    files = {
+        f"{project.name}.pjx": index_text(project.name, files, notes=project.notes),
+        f"{project.name}.dtx": data,
+        **files,
+    }
     return {f"{project.path}/{file}": text for file, text in files.items()}
 
 
@@ -131,8 +140,8 @@ def _data(project: PagedProgram, descriptors: Iterable[_Move], signals: Mapping[
         lines += array_lines(name, "dio", [{"link": link(signal, is_input=is_input)}])
     for page, ending in zip(project.pages, project.endings, strict=True):
         lines += array_lines(f"{JOINTS}{ending}", "jointRx", [_joints(project, row) for row in page])
-    lines += array_lines(MOVE, "mdesc", [_descriptor(move) for move in descriptors])
-    lines += array_lines(TOOL, "tool", [_tool(project.placed)])
+    lines += array_lines(MOVE, "mdesc", [descriptor(*move) for move in descriptors])
+    lines += array_lines(TOOL, "tool", [tool_values(project.placed, POSE_DECIMALS)])
     return data_text(project.notes, lines)
 
 
@@ -142,19 +151,12 @@ def _joints(project: PagedProgram, row: int) -> dict[str, str]:
     return {f"j{axis}": fixed(value, project.decimals) for axis, value in enumerate(values, start=1)}
 
 
-def _descriptor(move: _Move) -> dict[str, str]:
+def descriptor(speed: int, zone: int) -> dict[str, str]:
     """A motion at a share of the top speed that ends in a stop, or is left and reached at one distance from its row."""
-    shares = {"accel": "100", "vel": str(move.speed), "decel": "100"}
-    size = fixed(move.zone / 1000.0, 3) if move.zone else "0"
-    blend = {"blend": "joint" if move.zone else "off", "leave": size, "reach": size}
+    shares = {"accel": "100", "vel": str(speed), "decel": "100"}
+    size = fixed(zone / 1000.0, 3) if zone else "0"
+    blend = {"blend": "joint" if zone else "off", "leave": size, "reach": size}
     return {**shares, "tmax": NO_LIMIT, "rmax": NO_LIMIT, **blend}
-
-
-def _tool(placed: Robot) -> dict[str, str]:
-    """The tool of the cell on the flange of the controller."""
-    numbers = CONVENTIONS["staubli"].numbers(on_flange(placed, placed.tool.X_FT)).tolist()
-    named = zip(CONVENTIONS["staubli"].labels, numbers, strict=True)
-    return {**{item: fixed(value, POSE_DECIMALS) for item, value in named}, "fatherId": FLANGE}
 
 
 def _moves(
@@ -167,12 +169,6 @@ def _moves(
         if row in marks and handshake:
             lines += ["waitEndMove()", *handshake]
     return lines
-
-
-def _instruction(step: HandshakeStep, signals: Mapping[tuple[bool, str], str]) -> str:
-    """One step of a handshake."""
-    name, state = signals[step.waits, step.signal], "true" if step.is_on else "false"
-    return f"wait({name}=={state})" if step.waits else f"{name}={state}"
 
 
 def _read(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
