@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cellplan.cli.options import shared
 from cellplan.cli.options.completion import one_of
-from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.request import option
 from cellplan.cli.terminal.output import Result
 from cellplan.cli.terminal.progress import Listener, progress_listener
 from cellplan.errors import ExitStatus
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CheckOptions(Options):
+class CheckOptions(shared.JobOptions):
     """What is checked."""
 
     SCHEMA = "cellplan.check/1"
@@ -35,9 +35,6 @@ class CheckOptions(Options):
     ] = ()
     controllers: shared.Controllers = None
     watch: shared.Watch = False
-    as_json: shared.AsJson = False
-    quiet: shared.Quiet = False
-    allow_dirs: shared.AllowDirs = ()
 
 
 def check(options: CheckOptions) -> Result:

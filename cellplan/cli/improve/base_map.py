@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cellplan.cli.options import shared
 from cellplan.cli.options.completion import robot_names
-from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.request import option
 from cellplan.cli.terminal.errors import resumable
 from cellplan.cli.terminal.output import Result, result_of_folder, say
 from cellplan.cli.terminal.progress import progress_listener
@@ -15,7 +15,7 @@ from cellplan.errors import ExitStatus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MapOptions(Options):
+class MapOptions(shared.JobOptions):
     """Whose base is tried where, and where the map is written."""
 
     SCHEMA = "cellplan.map/1"
@@ -41,9 +41,6 @@ class MapOptions(Options):
     resume: Annotated[bool, option("--resume", "Continue the map in the folder.")] = False
     status: Annotated[bool, option("--status", "Say how far the map in the folder is, and do nothing.")] = False
     formats: shared.PlotFormats = ()
-    as_json: shared.AsJson = False
-    quiet: shared.Quiet = False
-    allow_dirs: shared.AllowDirs = ()
 
 
 def base_map(options: MapOptions) -> Result | None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cellplan.cli.options import shared
 from cellplan.cli.options.completion import cell_files
-from cellplan.cli.options.request import Options, argument, option
+from cellplan.cli.options.request import argument, option
 from cellplan.cli.terminal.errors import resumable
 from cellplan.cli.terminal.output import Result, result_of_folder
 from cellplan.cli.terminal.progress import progress_listener
@@ -15,7 +15,7 @@ from cellplan.errors import ExitStatus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CompareOptions(Options):
+class CompareOptions(shared.StudyOptions):
     """What is compared, and where the study is written."""
 
     SCHEMA = "cellplan.study/1"
@@ -31,16 +31,6 @@ class CompareOptions(Options):
     output: Annotated[
         Path | None, option("-o, --output DIR", "Study folder (default: outputs/<cell name>-compare).")
     ] = None
-    settings: shared.Settings = ()
-    task: shared.TaskName = None
-    workers: shared.Solvers = None
-    scheduler: shared.Scheduler = None
-    resume: shared.ResumeStudy = False
-    keep_runs: shared.KeepRuns = False
-    formats: shared.PlotFormats = ()
-    as_json: shared.AsJson = False
-    quiet: shared.Quiet = False
-    allow_dirs: shared.AllowDirs = ()
 
 
 def compare(options: CompareOptions) -> Result:

@@ -5,14 +5,14 @@ from pathlib import Path
 from typing import Annotated, ClassVar
 
 from cellplan.cli.options import shared
-from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.request import option
 from cellplan.cli.terminal.output import Result
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FastestOptions(Options):
+class FastestOptions(shared.JobOptions):
     """Whose cycle is shortened, and by what."""
 
     SCHEMA = "cellplan.fastest/1"
@@ -53,9 +53,6 @@ class FastestOptions(Options):
     trials: shared.Trials = None
     seed: shared.Seed = 0
     resume: shared.ResumeSearch = False
-    as_json: shared.AsJson = False
-    quiet: shared.Quiet = False
-    allow_dirs: shared.AllowDirs = ()
 
     @property
     def schema(self) -> str:

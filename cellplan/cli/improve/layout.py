@@ -6,12 +6,12 @@ from typing import Annotated
 
 from cellplan.cli.options import shared
 from cellplan.cli.options.completion import cell_files, one_of
-from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.request import option
 from cellplan.cli.terminal.output import Result, say
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LayoutOptions(Options):
+class LayoutOptions(shared.JobOptions):
     """What is searched for, by whom, and where it is written."""
 
     SCHEMA = "cellplan.layout/1"
@@ -73,9 +73,6 @@ class LayoutOptions(Options):
     ] = False
     resume: shared.ResumeSearch = False
     status: Annotated[bool, option("--status", "Say how far the search in the folder is, and do nothing.")] = False
-    as_json: shared.AsJson = False
-    quiet: shared.Quiet = False
-    allow_dirs: shared.AllowDirs = ()
 
 
 def layout(options: LayoutOptions) -> Result | None:

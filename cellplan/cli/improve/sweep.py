@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from cellplan.cli.options import shared
-from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.request import option
 from cellplan.cli.terminal.errors import resumable
 from cellplan.cli.terminal.output import Result, result_of_folder
 from cellplan.cli.terminal.progress import progress_listener
@@ -14,7 +14,7 @@ from cellplan.errors import ExitStatus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SweepOptions(Options):
+class SweepOptions(shared.StudyOptions):
     """What is varied, and where the study is written."""
 
     SCHEMA = "cellplan.study/1"
@@ -31,16 +31,6 @@ class SweepOptions(Options):
         None
     )
     mode: shared.Mode = None
-    settings: shared.Settings = ()
-    task: shared.TaskName = None
-    workers: shared.Solvers = None
-    scheduler: shared.Scheduler = None
-    resume: shared.ResumeStudy = False
-    keep_runs: shared.KeepRuns = False
-    formats: shared.PlotFormats = ()
-    as_json: shared.AsJson = False
-    quiet: shared.Quiet = False
-    allow_dirs: shared.AllowDirs = ()
 
 
 def sweep(options: SweepOptions) -> Result:

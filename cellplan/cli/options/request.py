@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, fields
-from inspect import Parameter
+from inspect import Parameter, get_annotations
 from typing import Annotated, Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
 
 import typer
@@ -12,7 +12,7 @@ Request = TypeVar("Request")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """The arguments and options of a command: the fields of a subclass, in the order of the help."""
+    """Arguments and options of a command: the fields of a class in the order of the help, before those of its base."""
 
     SCHEMA: ClassVar[str] = ""  # of the JSON object that the command prints
 
@@ -46,7 +46,8 @@ def parameters(kind: type[Options]) -> Iterator[Parameter]:
     A tuple is an option that may be repeated, to typer a list.
     """
     hints = get_type_hints(kind, include_extras=True)
-    for field in fields(kind):
+    rank = {name: place for place, base in enumerate(kind.__mro__) for name in get_annotations(base)}
+    for field in sorted(fields(kind), key=lambda field: rank[field.name]):
         value, declared = get_args(hints[field.name])
         default = Parameter.empty if field.default is MISSING else field.default
         if get_origin(value) is tuple:

@@ -1,10 +1,11 @@
 """Arguments and options that several commands share."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 from cellplan.cli.options.completion import cell_files, one_of, run_folders, task_names
-from cellplan.cli.options.request import argument, option
+from cellplan.cli.options.request import Options, argument, option
 
 CellFile = Annotated[Path, argument("CELL", "Cell file (YAML).", autocompletion=cell_files)]
 RunDir = Annotated[Path, argument("RUN", "Run folder.", autocompletion=run_folders)]
@@ -87,6 +88,28 @@ Scheduler = Annotated[
     ),
 ]
 Solvers = Annotated[int | None, option("--workers N", "Processes that solve (default: one for each processor).", min=1)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobOptions(Options):
+    """What every command has that does something with a cell; last in its help."""
+
+    as_json: AsJson = False
+    quiet: Quiet = False
+    allow_dirs: AllowDirs = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyOptions(JobOptions):
+    """What every study has of variants that are solved."""
+
+    settings: Settings = ()
+    task: TaskName = None
+    workers: Solvers = None
+    scheduler: Scheduler = None
+    resume: ResumeStudy = False
+    keep_runs: KeepRuns = False
+    formats: PlotFormats = ()
 
 
 def sources(options: Any) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cellplan.cli.options import shared
 from cellplan.cli.options.completion import one_of
 from cellplan.cli.options.given_options import require_choice
-from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.request import option
 from cellplan.cli.terminal.output import Result, notes
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RecoverOptions(Options):
+class RecoverOptions(shared.JobOptions):
     """Where a cell has stopped, and where its recovery is written."""
 
     SCHEMA = "cellplan.recovery/1"
@@ -58,9 +58,6 @@ class RecoverOptions(Options):
     cell: shared.OriginalCell = None
     without_cell: shared.WithoutCell = False
     controllers: shared.Controllers = None
-    as_json: shared.AsJson = False
-    quiet: shared.Quiet = False
-    allow_dirs: shared.AllowDirs = ()
 
 
 def recover(options: RecoverOptions) -> Result:

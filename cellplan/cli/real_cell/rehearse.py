@@ -6,14 +6,14 @@ from typing import Annotated
 
 from cellplan.cli.options import shared
 from cellplan.cli.options.completion import cell_files
-from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.request import option
 from cellplan.cli.terminal.output import Result, result_of_folder
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RehearseOptions(Options):
+class RehearseOptions(shared.JobOptions):
     """What is executed on which cells, and where it is written."""
 
     SCHEMA = "cellplan.rehearse/1"
@@ -34,9 +34,6 @@ class RehearseOptions(Options):
         None
     )
     plots: shared.PlotFormats = ()
-    as_json: shared.AsJson = False
-    quiet: shared.Quiet = False
-    allow_dirs: shared.AllowDirs = ()
 
 
 def rehearse(options: RehearseOptions) -> Result:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from cellplan.cli.options import shared
-from cellplan.cli.options.request import Options, argument, option
+from cellplan.cli.options.request import argument, option
 from cellplan.cli.terminal.output import say, say_json
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
@@ -14,7 +14,7 @@ FORMATS = ("svg", "dxf")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FloorPlanOptions(Options):
+class FloorPlanOptions(shared.JobOptions):
     """What is drawn, and where it is written."""
 
     SCHEMA = "cellplan.floorplan/1"
@@ -30,9 +30,6 @@ class FloorPlanOptions(Options):
     cell: shared.OriginalCell = None
     controllers: shared.Controllers = None
     settings: shared.Settings = ()
-    as_json: shared.AsJson = False
-    quiet: shared.Quiet = False
-    allow_dirs: shared.AllowDirs = ()
 
 
 def floor_plan(options: FloorPlanOptions) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cellplan.cli.options import shared
 from cellplan.cli.options.completion import run_folders
-from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.request import option
 from cellplan.cli.solve.exported import promise_lines
 from cellplan.cli.terminal.output import Result, notes
 from cellplan.cli.terminal.progress import progress_listener
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VerifyOptions(Options):
+class VerifyOptions(shared.JobOptions):
     """What is verified."""
 
     SCHEMA = "cellplan.verify/1"
@@ -37,9 +37,6 @@ class VerifyOptions(Options):
             autocompletion=run_folders,
         ),
     ] = None
-    as_json: shared.AsJson = False
-    quiet: shared.Quiet = False
-    allow_dirs: shared.AllowDirs = ()
 
 
 def verify(options: VerifyOptions) -> Result:

@@ -6,14 +6,14 @@ from typing import Annotated
 
 from cellplan.cli.options import shared
 from cellplan.cli.options.completion import cell_files
-from cellplan.cli.options.request import Options, argument, option
+from cellplan.cli.options.request import argument, option
 from cellplan.cli.terminal.output import Result
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ViewOptions(Options):
+class ViewOptions(shared.JobOptions):
     """What is shown, and where it is written."""
 
     SCHEMA = "cellplan.view/1"
@@ -31,9 +31,6 @@ class ViewOptions(Options):
     ] = None
     cell: shared.OriginalCell = None
     settings: shared.Settings = ()
-    as_json: shared.AsJson = False
-    quiet: shared.Quiet = False
-    allow_dirs: shared.AllowDirs = ()
 
 
 def view(options: ViewOptions) -> Result:
