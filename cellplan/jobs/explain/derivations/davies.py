@@ -208,7 +208,7 @@ def _robot_screws(robot: Robot, q: Array) -> tuple[Array, Array]:
     chain = chain_to_flange(robot.model)
     screws = np.zeros((6, len(chain)))
     D = robot.X_WB
-    for column, (axis, position) in enumerate(zip(chain, axis_positions(chain, q), strict=True)):
+    for column, ((axis, _), position) in enumerate(zip(chain, axis_positions(chain, q), strict=True)):
         s = D[:3, :3] @ axis.axis_B
         s0 = D[:3, :3] @ axis.point_B + D[:3, 3]
         screws[:, column] = np.concatenate([np.cross(s0, s), s] if axis.is_revolute else [s, np.zeros(3)])

@@ -77,11 +77,11 @@ def dh_chain(model: RobotModel) -> DHChain:
     is taken; where they coincide, x stays. The position of a sliding axis has no effect; the point of the table serves.
     """
     axes = chain_to_flange(model)
-    lines = [(axis.axis_B, axis.point_B) for axis in axes] + [(model.X_BF[:3, 2], model.X_BF[:3, 3])]
+    lines = [(axis.axis_B, axis.point_B) for axis, _ in axes] + [(model.X_BF[:3, 2], model.X_BF[:3, 3])]
     X_BD = _first_frame(*lines[0])
     rows: list[DHRow] = []
     X = X_BD
-    for axis, (s_B, s0_B) in zip(axes, lines[1:], strict=True):
+    for (axis, _), (s_B, s0_B) in zip(axes, lines[1:], strict=True):
         s, s0 = X[:3, :3].T @ s_B, X[:3, :3].T @ (s0_B - X[:3, 3])
         is_parallel = np.hypot(s[0], s[1]) < NEARLY_PARALLEL
         rows.append((_row_along if is_parallel else _row_across)(s, s0, is_revolute=axis.is_revolute))
@@ -98,7 +98,7 @@ def geometric_jacobian(chain: DHChain, q: Array) -> tuple[Array, Array]:
     frames = chain.frames(q)
     o_F = (frames[-1] @ chain.X_DF)[:3, 3]
     z, o = frames[:-1, :3, 2], frames[:-1, :3, 3]
-    turns = np.array([[float(axis.is_revolute)] for axis in chain.axes]).reshape(-1, 1)
+    turns = np.array([[float(axis.is_revolute)] for axis, _ in chain.axes]).reshape(-1, 1)
     J_v = turns * np.cross(z, o_F - o) + (1.0 - turns) * z
     shares = axis_shares(chain.axes, chain.joints)
     return J_v.T @ shares, (turns * z).T @ shares

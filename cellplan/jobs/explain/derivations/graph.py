@@ -196,10 +196,10 @@ def _robot_joints(robot: Robot, tool: str) -> list[Coupling]:
             tail=links[place],
             head=links[place + 1],
             kind=axis.kind,
-            drive=f"{robot.name}/{robot.model.joints[axis.leader].name}",
-            ratio=axis.ratio,
+            drive=f"{robot.name}/{robot.model.joints[drive.joint].name}",
+            ratio=drive.ratio,
         )
-        for place, axis in enumerate(chain)
+        for place, (axis, drive) in enumerate(chain)
     ]
 
 

@@ -1,62 +1,37 @@
 """Serial chain: the axes between a robot's base and its flange, in order, and how the driven joints move them."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, pose_from, rotation_about
 from cellplan.model.cell.cell import Cell, Robot
-from cellplan.model.robot.robot import JointKind, RobotModel
+from cellplan.model.robot.robot import Drive, FollowerJoint, Joint, RobotModel
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ChainAxis:
-    """One axis on the way from base to flange; a driven joint has ratio 1 and offset 0."""
+class ChainAxis(NamedTuple):
+    """One axis on the way from base to flange, and how a driven joint moves it."""
 
-    name: str  # name of the joint or follower
-    kind: JointKind  # revolute or prismatic
-    axis_B: Array  # unit direction at the reference configuration, shape (3,)
-    point_B: Array  # A point on the axis in [m], shape (3,)
-    leader: int  # index of the driven joint that moves it, in ``RobotModel.joints``
-    ratio: float = 1.0  # its motion per motion of that joint
-    offset: float = 0.0  # its position in [rad] or [m] when that joint reads zero
-
-    @property
-    def is_revolute(self) -> bool:
-        """Whether the axis turns rather than slides."""
-        return self.kind == JointKind.REVOLUTE
+    axis: Joint | FollowerJoint
+    drive: Drive
 
 
 def chain_to_flange(model: RobotModel) -> tuple[ChainAxis, ...]:
     """Axes that carry the flange, from the base on; joints and followers beside the way are left out."""
-    chain = []
-    for link in model.links_to_flange:
-        axis, drive = model.axes[link], model.drive(link)
-        chain.append(
-            ChainAxis(
-                name=axis.name,
-                kind=axis.kind,
-                axis_B=axis.axis_B,
-                point_B=axis.point_B,
-                leader=drive.joint,
-                ratio=drive.ratio,
-                offset=drive.offset,
-            )
-        )
-    return tuple(chain)
+    return tuple(ChainAxis(model.axes[link], model.drive(link)) for link in model.links_to_flange)
 
 
 def axis_positions(chain: tuple[ChainAxis, ...], q: Array) -> Array:
     """Positions of the axes of a chain for the robot's driven joints ``q``, shape (n,), in [rad] or [m]."""
-    return np.array([axis.ratio * q[axis.leader] + axis.offset for axis in chain])
+    return np.array([drive.ratio * q[drive.joint] + drive.offset for _, drive in chain])
 
 
 def axis_shares(chain: tuple[ChainAxis, ...], joints: int) -> Array:
     """Speed of each axis per speed of each driven joint, shape (axes, joints): a follower's share is its ratio."""
     shares = np.zeros((len(chain), joints))
-    for row, axis in enumerate(chain):
-        shares[row, axis.leader] = axis.ratio
+    for row, (_, drive) in enumerate(chain):
+        shares[row, drive.joint] = drive.ratio
     return shares
 
 

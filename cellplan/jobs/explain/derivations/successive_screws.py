@@ -117,9 +117,9 @@ def _steps(cell: Cell, robot: Robot, q: Array, *, X_PB: Array) -> list[ScrewStep
             s_P=X_PB[:3, :3] @ axis.axis_B,
             s0_P=X_PB[:3, :3] @ axis.point_B + X_PB[:3, 3],
             is_revolute=axis.is_revolute,
-            column=columns.start + axis.leader,
-            share=axis.ratio,
+            column=columns.start + drive.joint,
+            share=drive.ratio,
             position=position,
         )
-        for axis, position in zip(chain, axis_positions(chain, q[columns]), strict=True)
+        for (axis, drive), position in zip(chain, axis_positions(chain, q[columns]), strict=True)
     ]
