@@ -36,7 +36,7 @@ from cellplan.measures.joint_use import joint_uses
 from cellplan.measures.standoff import standoffs
 from cellplan.measures.tool_depth import tool_depths
 from cellplan.measures.tool_errors import closure_accuracy, part_poses, task_accuracy
-from cellplan.model.cell.cell import Cell, stacked_positions
+from cellplan.model.cell.cell import Cell, RobotRows, stacked_positions
 from cellplan.model.cell.idle import idle_robots
 from cellplan.model.motion.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
@@ -187,7 +187,7 @@ def completed(report: Report, certified: Clearance) -> Report:
 
 
 def _errors(
-    scene: Scene, schedule: Schedule, q: Mapping[str, Array], X_WP: Array
+    scene: Scene, schedule: Schedule, q: RobotRows, X_WP: Array
 ) -> tuple[tuple[TaskAccuracy, ...], tuple[ClosureAccuracy, ...]]:
     """Errors of all tasks and of all closures, at the rows and between them."""
     accuracy = tuple(
@@ -208,7 +208,7 @@ def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccu
     return checks
 
 
-def _joints(cell: Cell, times: Array, q: Mapping[str, Array]) -> tuple[list[JointUse], list[Check]]:
+def _joints(cell: Cell, times: Array, q: RobotRows) -> tuple[list[JointUse], list[Check]]:
     """How all joints are used, and whether they stay within their limits."""
     uses: list[JointUse] = []
     checks: list[Check] = []
@@ -220,7 +220,7 @@ def _joints(cell: Cell, times: Array, q: Mapping[str, Array]) -> tuple[list[Join
     return uses, checks
 
 
-def _speeds(scene: Scene, times: Array, q: Mapping[str, Array]) -> dict[str, RobotSpeed]:
+def _speeds(scene: Scene, times: Array, q: RobotRows) -> dict[str, RobotSpeed]:
     """How fast each robot moves in the world."""
     return {
         robot.name: robot_speed(robot, scene.chains[robot.name], times, q[robot.name]) for robot in scene.cell.robots

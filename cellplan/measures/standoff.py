@@ -10,14 +10,14 @@ from cellplan.geometry.line_spans import line_spans
 from cellplan.geometry.shapes import Solid, Sphere
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.measures.tool_errors import part_poses
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Standoff
 from cellplan.model.task.task import Frame, OffPart, Task
 from cellplan.scene.collision.bodies import BodyPoses, prepare
 from cellplan.scene.collision.distance import measure
 from cellplan.scene.collision.engine import Engine
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains
 
 UNSTATED: Final = 0.002  # [m] beyond its tolerance: a process that states nothing is at the surface within that
 TIP_RADIUS: Final = 1e-6  # [m] of the ball that stands for a tip: less than distances are worked out to
@@ -25,14 +25,8 @@ AT_SURFACE: Final = 1e-5  # [m] by which a tip may be inside the part and still 
 POSE_COUNT: Final = 1000  # rows of a task that are measured
 
 
-def standoffs(
-    cell: Cell, schedule: Schedule, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
-) -> tuple[Standoff, ...]:
-    """Distances of the tip of every task on the part, from where errors are judged on its path to the end of it.
-
-    Args:
-        q: Positions of each robot in [rad] or [m], shape (N, n).
-    """
+def standoffs(cell: Cell, schedule: Schedule, chains: Chains, q: RobotRows) -> tuple[Standoff, ...]:
+    """Distances of the tip of every task on the part, from where errors are judged on its path to the end of it."""
     standoffs = []
     for scheduled in schedule.tasks:
         task, times = scheduled.task, schedule.times

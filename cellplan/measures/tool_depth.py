@@ -1,6 +1,5 @@
 """Depth of tools in the part: how much of each tool is inside the part or beyond it, along the tool's own axis."""
 
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -10,11 +9,11 @@ from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.tool_columns import Columns, body_columns, depths, line_depths
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.measures.tool_errors import part_poses
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import ToolDepth
 from cellplan.model.task.task import Frame, Task
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains
 
 AXIS: Final = "axis"
 AXIS_COMPONENTS: Final = (0, 1, 2, 3, 4)  # of a task: they leave no more than the turn about one axis open
@@ -27,18 +26,13 @@ NEAR_WORST_COUNT: Final = 20  # rows evaluated round the deepest pose of a body
 RADIUS_FRACTION: Final = 0.5  # [-] of a body's radius that it moves between two poses at which it is evaluated
 
 
-def tool_depths(
-    cell: Cell, schedule: Schedule, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
-) -> tuple[ToolDepth, ...]:
+def tool_depths(cell: Cell, schedule: Schedule, chains: Chains, q: RobotRows) -> tuple[ToolDepth, ...]:
     """The largest depth of the tool of every task on the part, at any time of the program.
 
     The axis of a tool counts from the tip back to where the flange stands beside it, and its bodies count. The axis is
     evaluated at every row, and between rows that are more than a millimetre apart. Bodies are evaluated whenever the
     tool has moved on by half of a body's radius, so that no spot that a body passes over is left out, and at the rows
     round the deepest of these; a program that is too long for that is cut into even steps of motion.
-
-    Args:
-        q: Positions of each robot, shape (N, n).
     """
     return tuple(
         _task_depth(cell, scheduled, schedule.times, chains=chains, q=q)
@@ -91,9 +85,7 @@ def tool_reach(cell: Cell, robot: str) -> float:
     return max([along, zone, *(column.reach for column in columns)])
 
 
-def _task_depth(
-    cell: Cell, scheduled: TaskSchedule, times: Array, *, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
-) -> ToolDepth:
+def _task_depth(cell: Cell, scheduled: TaskSchedule, times: Array, *, chains: Chains, q: RobotRows) -> ToolDepth:
     """The largest depth of one task's tool, its time and the deepest body of the tool."""
     task = scheduled.task
     robot = cell.robot(task.robot)
@@ -111,9 +103,7 @@ def _task_depth(
     )
 
 
-def _tool_on_part(
-    cell: Cell, task: Task, times: Array, *, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
-) -> tuple[Array, Array]:
+def _tool_on_part(cell: Cell, task: Task, times: Array, *, chains: Chains, q: RobotRows) -> tuple[Array, Array]:
     """Times in [s] and tool poses on the part there; long steps are cut, every joint moving linearly in them."""
     movers = {task.robot, *(grasp.robot for grasp in cell.part.held_by[:1])}
     positions = {name: q[name] for name in sorted(movers)}

@@ -1,18 +1,16 @@
 """Errors of tools on the part and of co-holders on their grasps, from the joint positions that were read back."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.model.cell.cell import Cell, Relation
+from cellplan.model.cell.cell import Cell, Relation, RobotRows
 from cellplan.model.motion.motion import TaskSchedule
 from cellplan.model.report.report import ClosureAccuracy, TaskAccuracy
 from cellplan.model.task.task import Frame
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains, ScrewChain
 
 
-def part_poses(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> Array:
+def part_poses(cell: Cell, chains: Chains, q: RobotRows) -> Array:
     """The part frame in the world at every sample, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed pose."""
     if cell.carrier is None:
         return cell.part.X_CP[None]
@@ -96,16 +94,13 @@ def _turn_between(axes: Array, desired: Array) -> Array:
     return turn
 
 
-def closure_accuracy(
-    cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Array], X_WP: Array
-) -> tuple[ClosureAccuracy, ...]:
+def closure_accuracy(cell: Cell, chains: Chains, q: RobotRows, X_WP: Array) -> tuple[ClosureAccuracy, ...]:
     """Closure errors of every holder but the first ([Ribeiro2010]_ 4.5), in P; open components are zero.
 
     A rigid part cannot give way: what is an error here is force between the robots in the shop. Holders that stand
     still are checked as well.
 
     Args:
-        q: Positions of each robot, shape (N, n).
         X_WP: The part as the first holder carries it, shape (N, 4, 4) or (1, 4, 4).
     """
     accuracies = []

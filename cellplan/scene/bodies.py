@@ -9,12 +9,12 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import HalfSpace, Shape
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.model.cell.cell import Cell, Grasp, Part, Robot
+from cellplan.model.cell.cell import Cell, Grasp, Part, Robot, RobotRows
 from cellplan.model.cell.name_order import NameOrder
 from cellplan.model.cell.rod import tool_body_name
 from cellplan.model.robot.robot import BASE, Body
 from cellplan.scene.collision.bodies import BodyPoses, require_rigid
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains
 
 
 class Kind(StrEnum):
@@ -69,12 +69,12 @@ def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
     return tuple(bodies)
 
 
-def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> BodyPoses:
+def body_poses(bodies: Sequence[SceneBody], chains: Chains, q: RobotRows) -> BodyPoses:
     """Poses of all bodies in the world, from joint positions in [rad] or [m] by robot, shape (N, n) each."""
     return carried_poses(bodies, {name: chains[name].link_displacements(positions) for name, positions in q.items()})
 
 
-def link_displacements(cell: Cell, chains: Mapping[str, ScrewChain], q: Array) -> dict[str, Array]:
+def link_displacements(cell: Cell, chains: Chains, q: Array) -> dict[str, Array]:
     """Displacements of all links by robot, see ``ScrewChain``, at stacked joint positions of shape (N, nq)."""
     columns = {robot.name: cell.columns(robot.name) for robot in cell.robots}
     return {name: chains[name].link_displacements(q[:, indices]) for name, indices in columns.items()}

@@ -1,6 +1,6 @@
 """All pairs of bodies of a cell: which are watched and for what, which are left out, and how deep some may be."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -16,7 +16,7 @@ from cellplan.scene.collision.bodies import CollisionBody, prepare
 from cellplan.scene.collision.engine import Engine
 from cellplan.scene.collision.overlap.contact_zone import outside_zone
 from cellplan.scene.grips import grip_watch
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains
 from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair, works_like_a_tool
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
 from cellplan.scene.permanent_contacts import apply_design
@@ -33,9 +33,7 @@ class CollisionPairs:
     cut_from: tuple[int, ...]  # the body that each of these is cut from, by its index
 
     @classmethod
-    def of(
-        cls, cell: Cell, bodies: Sequence[SceneBody], *, engine: Engine, chains: Mapping[str, ScrewChain]
-    ) -> "CollisionPairs":
+    def of(cls, cell: Cell, bodies: Sequence[SceneBody], *, engine: Engine, chains: Chains) -> "CollisionPairs":
         """Sort all pairs of bodies, half-spaces last; the engine has those that are none.
 
         ``InputError`` where an exclusion names no body, or the mounting of a body cannot be meant.

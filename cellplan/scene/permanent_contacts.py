@@ -1,6 +1,6 @@
 """Pairs that touch, or come near, in every configuration: a robot's own design, or a mistake in its mounting."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Final
@@ -20,7 +20,7 @@ from cellplan.scene.collision.distance import measure
 from cellplan.scene.collision.engine import Engine
 from cellplan.scene.collision.overlap.containment import is_inside
 from cellplan.scene.collision.separation import heights
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains
 from cellplan.scene.link_tree import LinkTree
 from cellplan.scene.mounting import (
     MOUNT_DEPTH,
@@ -51,12 +51,7 @@ class Design:
 
 
 def apply_design(
-    cell: Cell,
-    bodies: Sequence[SceneBody],
-    pairs: Sequence[ScenePair],
-    *,
-    engine: Engine,
-    chains: Mapping[str, ScrewChain],
+    cell: Cell, bodies: Sequence[SceneBody], pairs: Sequence[ScenePair], *, engine: Engine, chains: Chains
 ) -> Design:
     """Leave out pairs in permanent contact by a robot's design; forbid only contact where design sets the distance.
 
@@ -112,9 +107,7 @@ class _Sampled:
         views: The bodies, by the further holder that carries the part; None for the first one.
     """
 
-    def __init__(
-        self, cell: Cell, bodies: Sequence[SceneBody], engine: Engine, chains: Mapping[str, ScrewChain]
-    ) -> None:
+    def __init__(self, cell: Cell, bodies: Sequence[SceneBody], engine: Engine, chains: Chains) -> None:
         """Draw the configurations; bodies are placed when they are first needed."""
         self.cell, self.bodies, self.engine = cell, bodies, engine
         self.views = _views(cell, bodies)

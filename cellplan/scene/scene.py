@@ -20,7 +20,7 @@ from cellplan.scene.collision.engine import Engine
 from cellplan.scene.collision.self_test import prove_engine
 from cellplan.scene.collision.separation import heights
 from cellplan.scene.collision_pairs import CollisionPairs
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains, ScrewChain
 from cellplan.scene.mounting import MountedPair, is_of_one_robot
 from cellplan.scene.moved import placed_columns, stands_by_link, with_bases
 from cellplan.scene.near import NearPairs, near_pairs, near_table_of
@@ -37,7 +37,7 @@ class Scene:
     """A cell made computable; safe to send to another process."""
 
     cell: Cell
-    chains: Mapping[str, ScrewChain]  # kinematic chain of each robot, by name
+    chains: Chains  # kinematic chain of each robot, by name
     bodies: tuple[SceneBody, ...]  # all solids, half-spaces last
     pairs: tuple[ScenePair, ...]  # pairs that are watched
     excluded: tuple[Excluded, ...]  # pairs that are not watched

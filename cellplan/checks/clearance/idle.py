@@ -1,24 +1,23 @@
 """Idle robots: each stays at its home, from the first row of its table to the last."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.cell.cell import Cell, Robot, RobotRows
 from cellplan.model.report.report import Check
 
 HOME_TOL: Final = 1e-7  # [deg] or [mm]: tables have twelve decimals, and cells as many
 
 
-def check_idle(cell: Cell, idle: Sequence[str], times: Array, q: Mapping[str, Array]) -> list[Check]:
+def check_idle(cell: Cell, idle: Sequence[str], times: Array, q: RobotRows) -> list[Check]:
     """One check for each idle robot: its largest distance from its home.
 
     Args:
         cell: The cell; a robot without a home is held against its first row.
         times: Times of the rows in [s], shape (N,).
-        q: Positions in [rad] or [m] by robot, shape (N, n).
     """
     return [_stands(cell.robot(name), times, q[name]) for name in idle]
 

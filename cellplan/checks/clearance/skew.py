@@ -6,7 +6,7 @@ Before its first row and after its last one a robot stands there. A robot that s
 on every clock: it meets the other one in the configurations of the run, of which the certificate of the run speaks.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
@@ -19,7 +19,7 @@ from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.tools.skew import ErrorGrowth, Mover, ShiftedTool, ToolTravel
 from cellplan.geometry.transforms import Array
 from cellplan.measures.tool_depth import tool_reach
-from cellplan.model.cell.cell import Cell, stacked_positions
+from cellplan.model.cell.cell import Cell, RobotRows, stacked_positions
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import ToolDepth
@@ -31,17 +31,11 @@ STAGE = "searching the allowed skew"
 
 
 def allowed_skew(
-    scene: Scene,
-    schedule: Schedule,
-    q: Mapping[str, Array],
-    depths: tuple[ToolDepth, ...],
-    *,
-    progress: Progress = silent,
+    scene: Scene, schedule: Schedule, q: RobotRows, depths: tuple[ToolDepth, ...], *, progress: Progress = silent
 ) -> SkewReport:
     """How far the clocks of a run may be apart.
 
     Args:
-        q: Positions of each robot in [rad] or [m], shape (N, n).
         depths: Largest depth of each tool on one clock, see ``tool_depths``.
     """
     cell, times = scene.cell, schedule.times
@@ -150,9 +144,7 @@ def _shortest_cycle(stated: float, allowed: float, duration: float) -> float:
     return float(np.inf) if allowed == 0.0 else duration * stated / allowed
 
 
-def _tools(
-    scene: Scene, schedule: Schedule, q: Mapping[str, Array], depths: tuple[ToolDepth, ...]
-) -> Iterator[_SkewedTool]:
+def _tools(scene: Scene, schedule: Schedule, q: RobotRows, depths: tuple[ToolDepth, ...]) -> Iterator[_SkewedTool]:
     """The tools that work on, or hold, a part that another clock carries."""
     cell, times = scene.cell, schedule.times
     if cell.carrier is None:

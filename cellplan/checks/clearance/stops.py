@@ -21,7 +21,7 @@ from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.measures.tool_depth import tool_axis_depths, tool_depth_at
 from cellplan.measures.tool_errors import errors_on_part, part_poses
-from cellplan.model.cell.cell import Cell, Grasp
+from cellplan.model.cell.cell import Cell, Grasp, RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import Check
@@ -46,15 +46,10 @@ DEPTH_TOL: Final = 1e-6  # [m] as in the check of depths without stops
 Figure = Callable[[Array, Array], Array]  # times of one robot and of the other in [s], shape (M,) -> values, shape (M,)
 
 
-def stop_report(
-    scene: Scene, schedule: Schedule, q: Mapping[str, Array], *, progress: Progress = silent
-) -> StopReport | None:
+def stop_report(scene: Scene, schedule: Schedule, q: RobotRows, *, progress: Progress = silent) -> StopReport | None:
     """Worst figures of all stops of one robot; None in a cell whose controllers do not state how others go on.
 
     The others are followed to the end of the rows.
-
-    Args:
-        q: Positions of each robot in [rad] or [m], shape (N, n).
     """
     going = running_on(scene.cell)
     if not going or len(schedule.times) < 2:
@@ -64,7 +59,7 @@ def stop_report(
     return stops.report(stops.whole_band)
 
 
-def one_stop(scene: Scene, schedule: Schedule, q: Mapping[str, Array], *, robot: str, at: float) -> StopReport | None:
+def one_stop(scene: Scene, schedule: Schedule, q: RobotRows, *, robot: str, at: float) -> StopReport | None:
     """The same for a single stop: of one robot at one instant in [s]."""
     going = running_on(scene.cell)
     if not going:
@@ -200,7 +195,7 @@ def _search(
 class _Stops:
     """Stops in one motion."""
 
-    def __init__(self, scene: Scene, schedule: Schedule, q: Mapping[str, Array], going: Mapping[str, float]) -> None:
+    def __init__(self, scene: Scene, schedule: Schedule, q: RobotRows, going: Mapping[str, float]) -> None:
         self._scene = _without_touching(scene_of_run(scene, [task.task.name for task in schedule.tasks]))
         self._cell, self._times, self._q, self._going = scene.cell, schedule.times, q, going
         self._tasks = [task.task for task in schedule.tasks if task.task.relative_to is Frame.PART]

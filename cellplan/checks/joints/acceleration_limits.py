@@ -1,6 +1,6 @@
 """Accelerations and jerk of joints, tools and part, and the limits of the joints, stated or assumed."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -23,18 +23,18 @@ from cellplan.model.cell.acceleration import (
     PointAcceleration,
     full_speed_in,
 )
-from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.cell.cell import Cell, Robot, RobotRows
 from cellplan.model.cell.joint_limits import acceleration_limit
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Check
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains
 
 FAILURE_ROWS: Final = (1.5, 2.5)  # [-] steps before and after the instant at which a joint fails: not judged
 FAILURE_REASON: Final = "a failing joint stops instantly, and the others compensate instantly"
 
 
 def motion_accelerations(
-    cell: Cell, chains: Mapping[str, ScrewChain], schedule: Schedule, *, q: Mapping[str, Array], X_WP: Array
+    cell: Cell, chains: Chains, schedule: Schedule, *, q: RobotRows, X_WP: Array
 ) -> MotionAccelerations:
     """Accelerations, jerk and process speeds of the written tables.
 

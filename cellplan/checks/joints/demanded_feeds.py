@@ -1,6 +1,6 @@
 """Demanded feeds: speeds of tools along their paths between rows, and the joint that is nearest to its limit there."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.measures.accelerations import jerks, point_accelerations
 from cellplan.measures.tool_errors import relative_to_task_frame
-from cellplan.model.cell.cell import Cell, Timing
+from cellplan.model.cell.cell import Cell, RobotRows, Timing
 from cellplan.model.cell.joint_limits import acceleration_limit, retimed_jerk_limit
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import Check
@@ -22,14 +22,13 @@ NEIGHBOURS: Final = 2  # [-] rows on both sides of a place whose accelerations c
 PERCENT: Final = 100.0
 
 
-def check_feeds(scene: Scene, schedule: Schedule, q: Mapping[str, Array], X_WP: Array) -> Iterator[Check]:
+def check_feeds(scene: Scene, schedule: Schedule, q: RobotRows, X_WP: Array) -> Iterator[Check]:
     """The speed of every tool with a demanded feed against it.
 
     Between the ramps of its path the speed between two rows must be within the tolerance; in the ramps it must not be
     larger. The delays of a retimed program must not be longer by more than that share, and a step.
 
     Args:
-        q: Positions by robot in [rad] or [m], shape (N, n) each.
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """
     for scheduled in schedule.tasks:
@@ -60,14 +59,13 @@ def _check_delay(task: Task, process: ProcessEntry, key: str, took: tuple[float,
     return Check(f"process_{key}", task.name, passed, message, value=took[1], limit=limit, unit="s", at_s=at_s)
 
 
-def nearest_to_limit(cell: Cell, times: Array, q: Mapping[str, Array], step: int) -> tuple[str, str, float]:
+def nearest_to_limit(cell: Cell, times: Array, q: RobotRows, step: int) -> tuple[str, str, float]:
     """The joint that is nearest to one of its limits in a step: name, limit, and share of it.
 
     In a retimed program the jerk counts as well, as it is limited there.
 
     Args:
         times: Times of the rows in [s], shape (N,).
-        q: Positions by robot in [rad] or [m], shape (N, n) each.
         step: Number of the first row of the step.
     """
     around = slice(max(0, step - NEIGHBOURS), step + NEIGHBOURS + 2)
@@ -91,7 +89,7 @@ def nearest_to_limit(cell: Cell, times: Array, q: Mapping[str, Array], step: int
 
 
 def _check(
-    cell: Cell, scheduled: TaskSchedule, process: ProcessEntry, *, times: Array, speeds: Array, q: Mapping[str, Array]
+    cell: Cell, scheduled: TaskSchedule, process: ProcessEntry, *, times: Array, speeds: Array, q: RobotRows
 ) -> Check:
     """The largest difference of the speed from the feed, as a share of the feed."""
     task, off = scheduled.task, speeds / process.feed_mm_s.si - 1.0

@@ -1,12 +1,11 @@
 """Joint drift: how far the joints are after each cycle from where they were at its start."""
 
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Check
 from cellplan.model.robot.repeatability import JointDrift, Repeatability
@@ -16,7 +15,7 @@ REVOLUTE_DRIFT_TOL: Final = float(np.deg2rad(0.001))  # [rad] below the repeatab
 PRISMATIC_DRIFT_TOL: Final = 1e-6  # [m] likewise
 
 
-def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Repeatability | None:
+def repeatability(cell: Cell, schedule: Schedule, q: RobotRows) -> Repeatability | None:
     """How far every joint is at the end of each cycle from where it was at its start.
 
     A cycle lies between two times at which all tools are at the pose of their start together. Tasks that begin and

@@ -1,13 +1,13 @@
 """Joints that fail during the motion: whether they remain at rest, and the effect on the tasks."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.report.report import Check, TaskAccuracy
 from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.task import ToleranceEntry
@@ -15,12 +15,11 @@ from cellplan.model.settings.task import ToleranceEntry
 STANDSTILL_TOL: Final = 1e-9  # [deg] or [mm] a joint that stands still may differ by: a thousand units in the tables
 
 
-def check_locked(cell: Cell, times: Array, q: Mapping[str, Array]) -> list[Check]:
+def check_locked(cell: Cell, times: Array, q: RobotRows) -> list[Check]:
     """Whether each joint that fails stays where it is from its instant on.
 
     Args:
         times: Times in [s], shape (N,).
-        q: Positions by robot, shape (N, n) each.
     """
     return [_check(cell, lock, times, q[lock.robot]) for lock in cell.motion.locked]
 

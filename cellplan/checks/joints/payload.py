@@ -1,6 +1,6 @@
 """Payload: the load of each robot, at rest and in the written motion, against its rated load."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -9,13 +9,13 @@ import numpy as np
 from cellplan.geometry.inertia import centre_and_inertia
 from cellplan.geometry.transforms import Array, inverse, transform_points
 from cellplan.measures.accelerations import point_accelerations
-from cellplan.model.cell.cell import Cell, Grasp, Robot
+from cellplan.model.cell.cell import Cell, Grasp, Robot, RobotRows
 from cellplan.model.report.report import Check
 from cellplan.model.robot.payload import AxisUse, LoadUse
 from cellplan.model.robot.robot import BASE, FollowerJoint, Joint
 from cellplan.model.settings.robot import AxisLimitEntry, PayloadEntry
 from cellplan.model.units import MM
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains, ScrewChain
 
 GRAVITY: Final = 9.80665  # [m/s^2] standard gravity, downwards along the world's z
 UP: Final = np.array([0.0, 0.0, 1.0])
@@ -41,9 +41,7 @@ class _CarriedLoad:
     inertia: Array  # about its centre, expressed in the world in [kg m^2], shape (N, 3, 3)
 
 
-def load_uses(
-    cell: Cell, chains: Mapping[str, ScrewChain], times: Array, q: Mapping[str, Array]
-) -> tuple[LoadUse, ...]:
+def load_uses(cell: Cell, chains: Chains, times: Array, q: RobotRows) -> tuple[LoadUse, ...]:
     """What every robot carries over a run.
 
     The part is shared equally by all that hold it. A tool weighs at its stated centre, else at its tip; the part at its
@@ -52,7 +50,6 @@ def load_uses(
 
     Args:
         times: Times of the rows in [s], shape (N,).
-        q: Joint positions by robot in [rad] or [m], shape (N, n) each.
     """
     return tuple(_load_use(cell, robot, chains[robot.name], times=times, q=q[robot.name]) for robot in cell.robots)
 
@@ -62,7 +59,7 @@ def check_payload(uses: tuple[LoadUse, ...]) -> list[Check]:
     return [check for use in uses for check in _checks(use)]
 
 
-def check_payload_at_rest(cell: Cell, chains: Mapping[str, ScrewChain], start: Array) -> list[Check]:
+def check_payload_at_rest(cell: Cell, chains: Chains, start: Array) -> list[Check]:
     """What the robots carry while they stand at one stacked configuration of shape (nq,) in [rad] or [m]."""
     still = {robot.name: np.tile(start[cell.columns(robot.name)], (2, 1)) for robot in cell.robots}
     return check_payload(load_uses(cell, chains, np.array([0.0, 1.0]), still))

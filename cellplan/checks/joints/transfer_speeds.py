@@ -1,13 +1,12 @@
 """Speeds in transfer moves, against what ``program.transfer`` allows."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from cellplan.certify.point_speeds import point_speeds
-from cellplan.geometry.arrays import Array
-from cellplan.model.cell.cell import stacked_positions
+from cellplan.model.cell.cell import RobotRows, stacked_positions
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Check, JointUse
 from cellplan.model.settings.units import si_or_none
@@ -17,15 +16,10 @@ from cellplan.scene.scene import Scene
 ROUNDING: Final = 1e-9  # [-] of a speed: times of rows have 12 decimals of a second
 
 
-def check_transfer_speeds(
-    scene: Scene, schedule: Schedule, uses: Sequence[JointUse], q: Mapping[str, Array]
-) -> list[Check]:
+def check_transfer_speeds(scene: Scene, schedule: Schedule, uses: Sequence[JointUse], q: RobotRows) -> list[Check]:
     """The fastest joint and the fastest point of each robot where no task is worked on, as far as they are limited.
 
     The speed of a point is a bound that holds between the rows too.
-
-    Args:
-        q: Positions by robot in [rad] or [m], shape (N, n).
     """
     if schedule.tasks:
         return []

@@ -1,26 +1,19 @@
 """Arcs at the same time: how near the tips of two tools on their paths come to each other."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Check
 from cellplan.model.units import MM
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains
 
 
-def check_arcs(
-    cell: Cell, schedule: Schedule, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
-) -> Iterator[Check]:
-    """Whether the tips of tools that are on their paths at once keep the distance that the program demands.
-
-    Args:
-        q: Positions of each robot in [rad] or [m], shape (N, n).
-    """
+def check_arcs(cell: Cell, schedule: Schedule, chains: Chains, q: RobotRows) -> Iterator[Check]:
+    """Whether the tips of tools that are on their paths at once keep the distance that the program demands."""
     least, times = cell.program.arcs_apart_mm, schedule.times
     for pair in combinations(schedule.tasks, 2) if least is not None else ():
         on = [(times >= it.task.start) & (times <= it.end + it.task.off_delay) for it in pair]

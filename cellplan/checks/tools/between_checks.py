@@ -1,12 +1,12 @@
 """Checks of tool errors between the rows of the tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
 from cellplan.checks.tools.between_rows import ErrorsBetweenRows
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.between_rows import BetweenError
 from cellplan.model.report.report import Check, ClosureAccuracy, TaskAccuracy
@@ -20,7 +20,7 @@ BETWEEN: Final = "_between_rows"  # what the name of a check ends with
 def check_between_rows(
     scene: Scene,
     schedule: Schedule,
-    q: Mapping[str, Array],
+    q: RobotRows,
     *,
     accuracy: Sequence[TaskAccuracy],
     closures: Sequence[ClosureAccuracy],
@@ -30,7 +30,6 @@ def check_between_rows(
 
     Args:
         schedule: Where every tool must be.
-        q: Positions by robot in [rad] or [m], shape (N, n) each.
         off: By how much each tool, those of the tasks first, may be off besides at the rows in [m] and [rad], shape
             (N, 2) each; between two rows by no more than the value between both. None for nothing.
     """

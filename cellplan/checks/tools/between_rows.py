@@ -13,7 +13,7 @@ is wider than what is allowed, and where the motion of a tool is not smooth, the
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -24,7 +24,7 @@ from cellplan.certify.lever_arms import LeverArms
 from cellplan.geometry.arrays import Indices
 from cellplan.geometry.transforms import Array
 from cellplan.measures.tool_errors import error_lengths, part_poses, relative_to_task_frame
-from cellplan.model.cell.cell import Relation, stacked_positions
+from cellplan.model.cell.cell import Relation, RobotRows, stacked_positions
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.between_rows import BetweenError, BetweenRows
 from cellplan.model.report.report import ClosureAccuracy, TaskAccuracy
@@ -63,12 +63,8 @@ class _MeasuredTool:
 class ErrorsBetweenRows:
     """A program between its rows."""
 
-    def __init__(self, scene: Scene, schedule: Schedule, q: Mapping[str, Array]) -> None:
-        """Store the program.
-
-        Args:
-            q: Positions by robot in [rad] or [m], shape (N, n) each.
-        """
+    def __init__(self, scene: Scene, schedule: Schedule, q: RobotRows) -> None:
+        """Store the program."""
         self._scene, self._schedule, self._q = scene, schedule, q
         stacked = stacked_positions(scene.cell, q)
         self._arms = LeverArms(scene, stacked)

@@ -6,11 +6,11 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array, skew
-from cellplan.model.cell.cell import Cell, Relation
+from cellplan.model.cell.cell import Cell, Relation, RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Conditioning
 from cellplan.model.task.task import Frame
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains
 
 MAX_SAMPLES: Final = 2000  # [-] worked on at once, however small the stack is
 WELL_CONDITIONED: Final = 1e-3  # [-] ratio of singular values down to which their squares give them to nine digits
@@ -18,13 +18,7 @@ STACK_WORK: Final = 4_000_000  # [-] entries of the stacked matrices worked on a
 
 
 def conditioning(
-    cell: Cell,
-    schedule: Schedule,
-    chains: Mapping[str, ScrewChain],
-    *,
-    q: Mapping[str, Array],
-    X_WP: Array,
-    moving: Sequence[str],
+    cell: Cell, schedule: Schedule, chains: Chains, *, q: RobotRows, X_WP: Array, moving: Sequence[str]
 ) -> Conditioning:
     r"""Singular values of the whole stack and of every moving robot's own Jacobian, along the motion.
 
@@ -36,7 +30,6 @@ def conditioning(
     Joints that stand still are left out. The units are mixed: metres and radians, without weights.
 
     Args:
-        q: Positions of each robot, shape (N, n).
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
         moving: Names of the robots that may move.
     """
@@ -80,13 +73,7 @@ def _relations(cell: Cell, schedule: Schedule, moving: Sequence[str]) -> list[tu
 
 
 def _blocks(
-    cell: Cell,
-    relation: Relation,
-    chains: Mapping[str, ScrewChain],
-    q: Mapping[str, Array],
-    *,
-    X_WP: Array,
-    R_PT: Array,
+    cell: Cell, relation: Relation, chains: Chains, q: RobotRows, *, X_WP: Array, R_PT: Array
 ) -> dict[str, Array]:
     """Constrained rows of one task or grasp over the joints of each robot that has a part in it, by robot name."""
     robot = relation.robot

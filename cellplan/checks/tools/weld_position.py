@@ -1,27 +1,25 @@
 """Tools and welds to gravity along their paths: the angle of a torch, and the position of a weld."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.measures.weld_position import position_name, torch_angles, weld_angles
+from cellplan.model.cell.cell import RobotRows
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import Check
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains
 
 ROUNDING: Final = 1e-7  # [rad] beyond a limit that is stated in whole degrees
 MOVES: Final = 1e-9  # [m/s] of a tool along its path: below it there is no direction of travel
 
 
-def check_weld_positions(
-    schedule: Schedule, chains: Mapping[str, ScrewChain], q: Mapping[str, Array], X_WP: Array
-) -> Iterator[Check]:
+def check_weld_positions(schedule: Schedule, chains: Chains, q: RobotRows, X_WP: Array) -> Iterator[Check]:
     """Whether torches and welds keep what their tasks demand, while the tools travel along their paths.
 
     Args:
-        q: Positions of each robot in [rad] or [m], shape (N, n).
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """
     for scheduled in schedule.tasks:

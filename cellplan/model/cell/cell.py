@@ -27,6 +27,8 @@ from cellplan.model.settings.program import NoTransfers, ProgramEntry
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.task.task import Frame, Service, Task
 
+RobotRows = Mapping[str, Array]  # positions of the joints of each robot in [rad] or [m], by its name, shape (N, n)
+
 
 class Mode(StrEnum):
     """Which robots move: MODO 1, 2, 3 of Ribeiro 2010, chapter 5; in the last one the part moves between the tasks."""
@@ -338,6 +340,6 @@ def joint_at(cell: Cell, column: int) -> tuple[str, str]:
     return [(robot.name, joint) for robot in cell.robots for joint in robot.model.joint_names][column]
 
 
-def stacked_positions(cell: Cell, q: Mapping[str, Array]) -> Array:
+def stacked_positions(cell: Cell, q: RobotRows) -> Array:
     """Positions of all robots side by side, shape (N, nq), from those of each robot in [rad] or [m], (N, n)."""
     return np.concatenate([q[robot.name] for robot in cell.robots], axis=1)

@@ -6,6 +6,7 @@ from enum import StrEnum
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.acceleration import UNKNOWN_ACCELERATIONS, MotionAccelerations
+from cellplan.model.cell.cell import RobotRows
 from cellplan.model.motion.plan import Phase
 from cellplan.model.presented import Presented
 from cellplan.model.report.between_rows import BetweenRows
@@ -299,7 +300,7 @@ class Report(Presented):
     motion_share: Mapping[str, tuple[float, str]]
     speeds: Mapping[str, RobotSpeed]
     times: Array
-    q: Mapping[str, Array]
+    q: RobotRows
     qd: Mapping[str, Array]
     closures: tuple[ClosureAccuracy, ...] = ()
     repeatability: Repeatability | None = None

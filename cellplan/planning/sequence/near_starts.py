@@ -19,7 +19,7 @@ from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.start.given import is_off, part_pose, tool_distance
 from cellplan.planning.start.inverse_kinematics import finite_limits, reaching_configurations, within_limits
 from cellplan.planning.start.trial_motion import StartTrial, StartTrials
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains, ScrewChain
 from cellplan.scene.scene import Scene
 
 SEEDS: Final = 24  # configurations round the last one from which the inverse kinematics begins
@@ -107,7 +107,7 @@ def _nearest(scene: Scene, task: Task, path: ClockedPath, last: Array) -> Array:
     return nearest
 
 
-def with_approach_starts(cell: Cell, chains: Mapping[str, ScrewChain], toolpaths: Mapping[str, Toolpath]) -> Cell:
+def with_approach_starts(cell: Cell, chains: Chains, toolpaths: Mapping[str, Toolpath]) -> Cell:
     """The cell, with at most one task a robot, with starts on the paths moved back to the begin of the approaches."""
     holder = cell.robot(cell.positioners[0]).start if cell.positioners else None
     X_WP = part_pose(cell, holder)

@@ -24,7 +24,7 @@ from cellplan.planning.start.inverse_kinematics import (
 from cellplan.planning.start.near_ties import best_first
 from cellplan.planning.start.seeds import seeded
 from cellplan.planning.start.trial_motion import StartTrials
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains
 
 SEEDS: Final = 48  # random starts of the inverse kinematics per robot and place; finds all 8 branches of a 6-axis arm
 SEEDS_PER_HOLDER: Final = 16  # the same when many configurations of the positioner are to be tried
@@ -44,7 +44,7 @@ class StartSearch:
     """What all parts of the search for a start use."""
 
     cell: Cell  # the cell in the order of names
-    chains: Mapping[str, ScrewChain]  # kinematic chain of each robot, by name
+    chains: Chains  # kinematic chain of each robot, by name
     paths: Mapping[str, ClockedPath]  # path of every task on the common clock, by task name
     trials: StartTrials  # the coarse clock on which motions are tried, and the bodies
     random: Mapping[str, np.random.Generator]  # random numbers of each robot, by name

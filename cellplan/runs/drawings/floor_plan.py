@@ -11,7 +11,7 @@ from cellplan.geometry.outlines import outlines, swept_outlines
 from cellplan.geometry.raster import contours, covered, stretches
 from cellplan.geometry.shapes import HalfSpace, Solid
 from cellplan.geometry.transforms import transform_points
-from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.cell.cell import Cell, Robot, RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.task.task import Frame
@@ -20,7 +20,7 @@ from cellplan.report.floor_plan.plan import FloorPlan, Layer, PlanOutline, PlanP
 from cellplan.report.plots.palette import robot_colours
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, scene_bodies
 from cellplan.scene.kinematics.reach import arm_reach, has_round_reach, reach_outline
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains, ScrewChain
 
 SQUARE: Final = 20.0  # [mm]
 TRAVEL: Final = 0.12  # [m] between the rows that a swept area is made of, at a metre from the axes that turn
@@ -124,9 +124,7 @@ def _outline(body: SceneBody, corners: Array) -> PlanOutline:
     )
 
 
-def _paths(
-    cell: Cell, paths: TaskPoints, chains: Mapping[str, ScrewChain], at: Mapping[str, Array]
-) -> Iterable[PlanPath]:
+def _paths(cell: Cell, paths: TaskPoints, chains: Chains, at: Mapping[str, Array]) -> Iterable[PlanPath]:
     """Paths where the part is."""
     X_WP = cell.part.X_CP
     if cell.part.held_by:
@@ -148,7 +146,7 @@ def _walls(cell: Cell) -> Iterable[PlanWall]:
 
 
 def _swept(
-    cell: Cell, bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], motions: Sequence[Mapping[str, Array]]
+    cell: Cell, bodies: Sequence[SceneBody], chains: Chains, motions: Sequence[Mapping[str, Array]]
 ) -> dict[str, Indices]:
     """Squares that moving links, tools and the part cover, by the robot that moves them."""
     columns: dict[str, list[Indices]] = {robot.name: [] for robot in cell.robots}
@@ -162,7 +160,7 @@ def _swept(
     return {name: stretches(np.concatenate(indices)) for name, indices in columns.items() if indices}
 
 
-def _rows(q: Mapping[str, Array]) -> Indices:
+def _rows(q: RobotRows) -> Indices:
     """Rows of a motion between which no joint moves far; the first and the last among them."""
     steps = np.max([np.abs(np.diff(values, axis=0)).sum(axis=1) for values in q.values()], axis=0)
     travelled = np.concatenate([[0.0], np.cumsum(steps)])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import HalfSpace, support
 from cellplan.geometry.transforms import transform_points
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Report
 from cellplan.model.report.verified_run import VerifiedMotion
@@ -26,7 +26,7 @@ from cellplan.runs.drawings.floor_plan import floor_plan, schedule_paths, swept_
 from cellplan.runs.drawings.instant import Instant, graver, heading, is_exact, worst_instant
 from cellplan.runs.solution import Run
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, scene_bodies
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains, ScrewChain
 
 PATH_POINTS: Final = 81  # [-] of a path
 CONTACT_SIDES: Final = 24  # [-] of round bodies where a place of contact is sought
@@ -135,12 +135,7 @@ def materials(cell: Cell) -> Mapping[str, Colour]:
 
 
 def _mark(
-    instant: Instant,
-    cell: Cell,
-    solids: Sequence[ShownSolid],
-    *,
-    chains: Mapping[str, ScrewChain],
-    q: Mapping[str, Array],
+    instant: Instant, cell: Cell, solids: Sequence[ShownSolid], *, chains: Chains, q: RobotRows
 ) -> tuple[Array, str]:
     """The points that matter in the world, and what is written beside them."""
     if instant.minimum is not None and instant.minimum.points is not None:
@@ -187,7 +182,7 @@ def _inside(points: Array, surface: Array) -> NDArray[np.bool_]:
     return (points @ normals.T - offsets).max(axis=1) <= -INSIDE
 
 
-def _paths(cell: Cell, schedule: Schedule, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> list[ShownLine]:
+def _paths(cell: Cell, schedule: Schedule, chains: Chains, q: RobotRows) -> list[ShownLine]:
     """The path of every task, where the part is."""
     paths = []
     for task in schedule.tasks:
@@ -199,7 +194,7 @@ def _paths(cell: Cell, schedule: Schedule, chains: Mapping[str, ScrewChain], q: 
     return paths
 
 
-def _part_pose(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> Array:
+def _part_pose(cell: Cell, chains: Chains, q: RobotRows) -> Array:
     """Pose of the part in the world, shape (4, 4)."""
     if not cell.part.held_by:
         return cell.part.X_CP
@@ -207,9 +202,7 @@ def _part_pose(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Arr
     return chains[holder].tool_poses(q[holder])[0] @ cell.part.X_CP
 
 
-def _skeletons(
-    cell: Cell, bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
-) -> list[ShownLine]:
+def _skeletons(cell: Cell, bodies: Sequence[SceneBody], chains: Chains, q: RobotRows) -> list[ShownLine]:
     """Robots without bodies as lines from axis to axis, and tools without bodies from the flange to their tips."""
     links = {body.robot for body in bodies if body.kind is Kind.LINK}
     tools = {body.robot for body in bodies if body.kind is Kind.TOOL}

@@ -11,11 +11,11 @@ from cellplan.planning.sequence.near_starts import with_approach_starts
 from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.start.seeds import with_seeds
 from cellplan.runs.plan.rounded import with_rounded_starts, with_start
-from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.scene.kinematics.screw_chain import Chains
 
 
 def with_placed_starts(
-    cell: Cell, toolpaths: Mapping[str, Toolpath], chains: Mapping[str, ScrewChain], *, near: Branches | None = None
+    cell: Cell, toolpaths: Mapping[str, Toolpath], chains: Chains, *, near: Branches | None = None
 ) -> tuple[Cell, tuple[MovedStart, ...]]:
     """The cell of one block with its starts on their tasks, and how far each was moved; missing ones stay missing.
 

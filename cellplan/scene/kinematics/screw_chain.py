@@ -4,6 +4,7 @@ The checks, the collision bodies and the reports use this file; the planner uses
 one of them shows as an error in the report ([Ribeiro2010]_ appendix B).
 """
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -154,3 +155,6 @@ def _moved_screw(axis: Joint | FollowerJoint, D: Array) -> Array:
         return np.concatenate([s, np.zeros_like(s)], axis=1)
     s0 = D[:, :3, :3] @ axis.point_B + D[:, :3, 3]
     return np.concatenate([np.cross(s0, s), s], axis=1)
+
+
+Chains = Mapping[str, ScrewChain]  # by robot
