@@ -10,7 +10,7 @@ from builders.study_trials import InThisProcess
 
 from cellplan import BaseGrid, MapRequest, base_map, load_cell, map_study
 from cellplan.cli.main import run
-from cellplan.jobs.base_map import tiles
+from cellplan.jobs.base_map import base_map as map_module
 from cellplan.study.folder import prepare_folder
 from cellplan.study.workers import crashed
 
@@ -24,7 +24,7 @@ FEW = 8  # [-] motions at once, so that a small map has four tiles
 @pytest.fixture(scope="module", autouse=True)
 def _small_tiles() -> Any:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tiles, "AT_ONCE", FEW)
+        patch.setattr(map_module, "AT_ONCE", FEW)
         yield
 
 
@@ -94,7 +94,7 @@ def test_tiles_cover_every_place_with_a_start_once(folder: Path) -> None:
     assert all(tile == same[0] for same in phases for tile in same)
     places = [place for same in phases for place in same[0]]
     moved = [number for number, place in enumerate(record["places"]) if place["figures"]]
-    assert len(trials) % tiles.SHARES == 0
+    assert len(trials) % map_module.SHARES == 0
     assert len(places) == len(set(places))
     assert set(moved) <= set(places)
 
