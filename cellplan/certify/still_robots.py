@@ -96,10 +96,8 @@ class _Table:
     def too_near_others(self, robot_poses: BodyPoses, extra: float) -> tuple[str, str] | None:
         """The same of the other pairs, at all samples."""
         self._limits = self._demanded + extra * self._has_extra
-        self._poses.R[self._robot_bodies], self._poses.p[self._robot_bodies] = (
-            robot_poses.R[self._robot_bodies],
-            robot_poses.p[self._robot_bodies],
-        )
+        self._poses.R[self._robot_bodies] = robot_poses.R[self._robot_bodies]
+        self._poses.p[self._robot_bodies] = robot_poses.p[self._robot_bodies]
         for place, sample in enumerate(self._order):
             row = self._among(self._others, self._poses, sample=sample)
             if row is not None:

@@ -42,9 +42,8 @@ from cellplan.errors import ExitStatus
 
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # schemas need none, and the search for them takes 20 ms
 
-INTERRUPTIONS: Final = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-]  # a background job ignores the first of them
+# a background job ignores the first of them
+INTERRUPTIONS: Final = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 GARBAGE_THRESHOLD: Final = 200_000  # objects: by default all are searched for cycles many times while modules load
 REPEAT_DELAY_S: Final = 0.02  # [s] delay after which the callback that lost the interruption has ended
 

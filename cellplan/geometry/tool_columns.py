@@ -19,14 +19,8 @@ SIDE_TOL: Final = 1e-4  # [m] what the side of a body reaches into a wall along 
 EDGE_TOL: Final = 1e-6  # [m] columns of a rim stand this far within it, so that rounding does not lose them
 HALF_FRACTION: Final = 0.5  # [-] a column that is less than half as deep just beside grazes
 RIM_COLUMN_COUNT: Final = 24  # on the rim of a body's outline
-RING_FRACTIONS: Final = (
-    0.9,
-    0.75,
-    0.6,
-    0.45,
-    0.3,
-    0.15,
-)  # [-] shares of the rim's radius at which columns stand as well
+# [-] shares of the rim's radius at which columns stand as well
+RING_FRACTIONS: Final = (0.9, 0.75, 0.6, 0.45, 0.3, 0.15)
 LINES_AT_ONCE: Final = 200_000  # lines followed at once: memory
 
 

@@ -25,14 +25,8 @@ from cellplan.report.record.summary import ProgramRecords, program_records
 from cellplan.runs.drawings.picture import FLOOR_PLAN, STILL, drawings_by_place
 from cellplan.runs.solution import Run, Solution
 
-ENGINES: Final = (
-    "numpy",
-    "pin",
-    "python-fcl",
-    "coal",
-    "daqp",
-    "trimesh",
-)  # packages whose arithmetic the result rests on
+# packages whose arithmetic the result rests on
+ENGINES: Final = ("numpy", "pin", "python-fcl", "coal", "daqp", "trimesh")
 
 
 def write_run(

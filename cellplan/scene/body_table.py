@@ -47,12 +47,10 @@ class BodyTable:
         if bodies:
             centres, radii, ends, girths = centres.copy(), radii.copy(), ends.copy(), girths.copy()
             for index, body in bodies.items():
-                centres[index], radii[index], ends[index], girths[index] = (
-                    body.centre,
-                    body.radius,
-                    body.ends,
-                    body.girth,
-                )
+                centres[index] = body.centre
+                radii[index] = body.radius
+                ends[index] = body.ends
+                girths[index] = body.girth
             supports = supports.replaced(bodies)
         return replace(self, X_LS=X_LS, centres=centres, radii=radii, ends=ends, girths=girths, supports=supports)
 

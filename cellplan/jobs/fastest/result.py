@@ -144,10 +144,8 @@ def _robots(figures: Figures) -> dict[str, dict[str, Any]]:
 
 def _demand(cycles: ShortestCycles, demand: MetDemand) -> dict[str, Any]:
     """The demand, its program and the shares that it saves of others."""
-    program, shortest = (
-        demand.program,
-        min(cycles.by_time_laws, cycles.by_common_speed, key=lambda program: program.cycle),
-    )
+    program = demand.program
+    shortest = min(cycles.by_time_laws, cycles.by_common_speed, key=lambda other: other.cycle)
     return {
         "parts_per_h": number(demand.per_hour),
         "allowed_cycle_s": number(demand.allowed),

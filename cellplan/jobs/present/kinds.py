@@ -40,16 +40,8 @@ SERIES: Final = ResultKind(
     tables=lambda record: {"curves": lambda: curve_columns(record)},
     shown={},
 )
-OF_JOBS: Final = (
-    MAP,
-    FASTEST,
-    ASSIGNMENT,
-    ADVICE,
-    REHEARSAL,
-    COMPARISON,
-    LAYOUT,
-    STUDY,
-)  # where two files are, the first is shown
+# where two files are, the first is shown
+OF_JOBS: Final = (MAP, FASTEST, ASSIGNMENT, ADVICE, REHEARSAL, COMPARISON, LAYOUT, STUDY)
 KINDS: Final[Mapping[str, ResultKind]] = {kind.name: kind for kind in (*OF_JOBS, RUN, SERIES)}
 
 

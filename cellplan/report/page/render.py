@@ -49,9 +49,8 @@ NARROW_FRACTION: Final = 0.05  # [-] fraction of the half range: smaller margins
 FAST_FRACTION: Final = 0.95  # [-] fraction of the speed limit: higher speeds are marked
 SCRIPTS: Final = ("page.js", "figures.js")
 TEMPLATES: Final = Path(__file__).resolve().parent / "templates"
-PACKAGE: Final = TEMPLATES.parents[
-    2
-]  # the template of a kind of result stands beside its job: jobs/fastest/fastest.html
+# the template of a kind of result stands beside its job: jobs/fastest/fastest.html
+PACKAGE: Final = TEMPLATES.parents[2]
 OPTIONS: Final = ("autoescape", "trim_blocks", "lstrip_blocks", "keep_trailing_newline", "optimized")
 
 

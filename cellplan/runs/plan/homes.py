@@ -26,11 +26,8 @@ from cellplan.scene.scene import Scene
 
 STAGE: Final = "searching for homes of idle robots"
 TRIED_SAMPLES: Final = 32  # samples of each phase at which candidates are tried before one is certified
-EXTRA_CLEARANCES: Final = (
-    0.05,
-    0.02,
-    0.0,
-)  # [m] beyond the demanded clearance that the part and other robots are to leave a home
+# [m] beyond the demanded clearance that the part and other robots are to leave a home
+EXTRA_CLEARANCES: Final = (0.05, 0.02, 0.0)
 MAX_CERTIFIED: Final = 24  # candidates per robot of which certification is tried; each failure adds its sample
 
 

@@ -55,11 +55,9 @@ class TaskScrews:
         axes, points, tips = (np.ascontiguousarray(part.T) for part in (state.axes, state.points, state.p_WT))
         R_WT = np.ascontiguousarray(np.swapaxes(state.R_WT.T, -1, -2))
         R_WP, p_WP = _part_poses(job, R_WT, tips)
-        on_part, operators, turning = (
-            constraints.is_on_part[:, None],
-            constraints.operators,
-            chains.is_turning.T[:, :, None],
-        )
+        on_part = constraints.is_on_part[:, None]
+        operators = constraints.operators
+        turning = chains.is_turning.T[:, :, None]
         R = np.where(on_part[:, :, None], R_WP[:, None], np.eye(3))
         p = np.where(on_part, p_WP[:, None], np.zeros(3))
         bases, tools = np.swapaxes(directions.base, 1, 2), np.swapaxes(directions.tool, 1, 2)

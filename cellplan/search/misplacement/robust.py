@@ -281,10 +281,8 @@ class ScenarioProblem(GuardedProblem):
             differentiate(self.job, layouts.of_places(slice(place, place + 1)), q[place], qd[place], directions)
             for place in range(count)
         ]
-        by_q, by_qd = (
-            np.concatenate([derivative.q for derivative in derivatives]),
-            np.concatenate([derivative.qd for derivative in derivatives]),
-        )
+        by_q = np.concatenate([derivative.q for derivative in derivatives])
+        by_qd = np.concatenate([derivative.qd for derivative in derivatives])
         qdd = None
         if self.is_accelerating:
             qdd = (self.job.rates @ by_qd.reshape(count, q.shape[1], -1)).reshape(by_qd.shape)

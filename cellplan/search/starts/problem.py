@@ -130,10 +130,8 @@ class StartProblem:
         Raises:
             InputError: The paths or bodies of the cell are not usable.
         """
-        scene, paths = (
-            Scene.from_cell(cell),
-            clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks]),
-        )
+        scene = Scene.from_cell(cell)
+        paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
         phase = plan_phases(cell).program[0]
         schedule, moving = schedule_paths(cell, [paths[name] for name in phase.tasks]), tuple(phase.moving)
         middles = [0.5 * np.add(*finite_limits(robot.model)) for robot in cell.robots]

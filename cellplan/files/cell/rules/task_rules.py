@@ -71,10 +71,8 @@ def _robots(program: ProgramEntry, able: Mapping[str, Sequence[str]], document: 
             robots = "; ".join(f"'{name}' {listed(able[name])}" for name in names)
             if key == "same_robot":
                 same |= dict.fromkeys(names, names[0])
-                is_possible, words = (
-                    bool(set.intersection(*(set(able[name]) for name in names))),
-                    "that one robot may do",
-                )
+                is_possible = bool(set.intersection(*(set(able[name]) for name in names)))
+                words = "that one robot may do"
             else:
                 choices, words = product(*(able[name] for name in names)), "of different robots"
                 is_possible = any(len(set(choice)) == len(choice) for choice in choices)

@@ -287,10 +287,8 @@ class _Corners:
         lower = np.array(
             [float(end) if tolerance.extent >= end else 0.0 for tolerance, end in zip(measured, ends, strict=True)]
         )
-        upper, first = (
-            np.array([tolerance.extent for tolerance in measured]),
-            [tolerance.first for tolerance in measured],
-        )
+        upper = np.array([tolerance.extent for tolerance in measured])
+        first = [tolerance.first for tolerance in measured]
         at, open_ones = upper.copy(), [place for place, verdict in enumerate(measured) if verdict.extent > 0.0]
         for _ in range(NARROWER if self.finish.ready.phases is None else 1):
             placed = [(at[place] * measured[place].unit, measured[place].start) for place in open_ones]

@@ -40,10 +40,8 @@ from cellplan.search.variables.variables import Variables
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
 UNLIMITED: Final = 1e6  # [s] that motions may last which are timed when they are solved
 NOT_FOLLOWED: Final = "a tool loses its path at the nodes of the search"  # of a layout that solve may yet follow
-ALONG_SPLINE: Final = {
-    CycleTiming.LAWS: 4,
-    CycleTiming.RETIMED: 2,
-}  # [-] times as many of a motion along a spline, no parabolas
+# [-] times as many of a motion along a spline, no parabolas
+ALONG_SPLINE: Final = {CycleTiming.LAWS: 4, CycleTiming.RETIMED: 2}
 SINGULAR_SHARE: Final = 0.1  # [-] of usual singular values: a wrist a few degrees from straight
 NEARLY: Final = 0.99  # [-] of demanded singular values: kept
 SINGULAR_EVERYWHERE: Final = 1e-6  # usual singular value in [m] and [rad] below which it says nothing

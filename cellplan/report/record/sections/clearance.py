@@ -10,12 +10,8 @@ from cellplan.model.units import MM
 from cellplan.report.record.common import Number, number
 
 Accuracies = list[Number]
-CLASSES: Final = {
-    "robot_robot": "robot to robot",
-    "part": "part",
-    "self": "own bodies",
-    "environment": "surroundings",
-}  # what each class is called
+# what each class is called
+CLASSES: Final = {"robot_robot": "robot to robot", "part": "part", "self": "own bodies", "environment": "surroundings"}
 
 Contact = TypedDict(
     "Contact",
