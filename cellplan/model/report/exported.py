@@ -99,6 +99,8 @@ class RobotRows:
     feeds: Array | None = None
     # rows through which an arc leads to the next row, shape (N,); None for rows without any
     middles: NDArray[np.bool_] | None = None
+    # time in [s] of the motion to each row as a file of single motions states it, shape (N,); NaN where it states none
+    durations: Array | None = None
     # how far the tool may be from the even motion of the joints in each step, in [m] and [rad], shape (N - 1, 2); None
     # for a target that moves them evenly
     tube: Array | None = None

@@ -265,6 +265,7 @@ class ReadMove:
     zone: float = 0.0
     share: float = 0.0
     process: Which | None = None
+    duration: float = np.nan
 
 
 def rows_of_moves(
@@ -291,6 +292,7 @@ class _RowsOfMoves:
         self._events = events
         self._rows: list[tuple[Array, Array, Sequence[int] | None, float, bool]] = []  # q, pose, configuration, feed
         self._zones: list[tuple[float, float]] = []
+        self._durations: list[float] = []
         self._process: list[bool] = []
         self._marks: list[int] = []
         self._seams: list[Seam] = []
@@ -331,6 +333,7 @@ class _RowsOfMoves:
             self._rows.append((move.q, pose, stated, move.feed, place < len(move.poses) - 1))
         count = len(self._rows) - first
         self._zones += [(0.0, 0.0)] * (count - 1) + [(move.zone, move.share)]
+        self._durations += [move.duration] * count
         self._process += [is_on] * count
         if not move.poses:
             return
@@ -366,6 +369,7 @@ class _RowsOfMoves:
             seams=tuple(self._seams),
             feeds=np.array(feeds) if self._seams else None,
             middles=is_middle if self._seams else None,
+            durations=None if np.all(np.isnan(self._durations)) else np.array(self._durations),
         )
 
 

@@ -121,6 +121,12 @@ def _other_process(written: RobotRows, read: RobotRows) -> str | None:
 
 def _other_time(written: RobotRows, read: RobotRows) -> str | None:
     """The first time that is not as written; None also where the format states none."""
+    if read.durations is not None and written.times is not None:
+        expected = np.diff(written.times)
+        late = np.abs(read.durations[1:] - expected) > TIME_ROUNDING
+        if np.any(late):
+            row = int(np.argmax(late))
+            return f"row {row + 2}: expected a motion of {expected[row]:.6g} s, read {read.durations[row + 1]:.6g} s"
     if read.times is None or written.times is None:
         return None
     late = ~(np.abs(read.times - written.times) <= TIME_ROUNDING)

@@ -31,14 +31,15 @@ from cellplan.programs.elements.text import fixed, safe_names
 from cellplan.programs.formats.rapid.data import RapidData
 from cellplan.programs.formats.rapid.moves import STOP, Place, RapidMove, read_move
 from cellplan.programs.formats.rapid.rows import UNIT_TOL, rounding, rows_of
+from cellplan.programs.formats.rapid.speeds import axis_speeds, turn_speed
 from cellplan.programs.formats.rapid.targets import frame_text, joint_targets, part_targets
 from cellplan.programs.formats.rapid.text import Datum, RapidStatement, plain_statement, value_of
 from cellplan.programs.formats.rapid.units import DECIMALS, LONGEST_NAME, RESERVED, TASKS, ZONES, RapidUnit, rapid_task
 from cellplan.programs.formats.zones import on_scale
 
 LONGEST_ROUTINE: Final = LONGEST_NAME - 5  # room for the number of a point
-TURN_SPEED: Final = 500  # [deg/s] of a tool, as the speeds of the language have it
 WAIT_DECIMALS: Final = 3
+LAST: Final = 1  # [deg/s] by which rounding changes a turn
 NEAR: Final = 1.5e-4  # [mm] or [-] rounding of a frame; a quaternion has more decimals
 TRIGGER: Final = "trigg"  # data of outputs that are switched ahead, with their number
 SLOTS: Final = ("point", "via", "speed", "zone", "tool", "frame")
@@ -124,7 +125,8 @@ class PacedWriter:
         for number in range(len(rapid_events(frame, self.unit).setup)):
             yield f"VAR triggdata {TRIGGER}_{number + 1};"
         for feed in sorted({feed_text(move.feed) for move in self.moves if move.is_tool}, key=float):
-            yield f"CONST speeddata {speed_name(feed)} := [{feed},{TURN_SPEED},100,20];"
+            others = ",".join(map(str, axis_speeds(self.unit, self._turns(feed))))
+            yield f"CONST speeddata {speed_name(feed)} := [{feed},{others}];"
         on_seam = self.rows.on_seam
         joints = joint_targets(self.unit, self.rows.q)
         for row in np.flatnonzero(~on_seam).tolist():
@@ -133,6 +135,14 @@ class PacedWriter:
             poses = part_targets(self.unit, self.rows.q[on_seam], self.rows.X_PT[on_seam])
             for row, target in zip(np.flatnonzero(on_seam).tolist(), poses, strict=True):
                 yield f"CONST robtarget {self.point(row)} := {target};"
+
+    def _turns(self, feed: str) -> list[float]:
+        """Speeds in [deg/s] of the turn of the tool on lines and arcs at a speed; behind joints it keeps its turn."""
+        X = self.rows.X_PT
+        moves = [move for move in self.moves if move.is_tool and feed_text(move.feed) == feed]
+        spans = [slice((move.middle or move.row) - 1, move.row + 1) for move in moves]
+        known = [] if X is None else [X[span] for span in spans if np.all(np.isfinite(X[span.start]))]
+        return [turn_speed(list(poses), float(feed) / MM) for poses in known]
 
     def routines(self, joint_moves: Sequence[str]) -> dict[str, list[str]]:
         """Statements of the main routine and of that of each seam, by name; ``joint_moves`` are those by row."""
@@ -216,6 +226,7 @@ class PacedReader:
         self._events = rapid_events(frame, unit)
         self._tasks = {name.lower(): task for task, name in routine_names(frame, unit).items()}
         self._used: set[str] = set()
+        self._here: tuple[Array, ...] = ()  # pose at which the last line or arc ended
         self._forms = list(self._move_forms())
 
     def rows(self, statements: Sequence[tuple[str, RapidStatement]]) -> RobotRows:
@@ -232,6 +243,7 @@ class PacedReader:
                 self._data.require_meeting(statement)
                 between[-1].append(statement.text)
                 continue
+            self._here = move.poses[-1:] if isinstance(move, ReadMove) else ()
             moves.append(move)
             tasks.append(task)
             between.append([])
@@ -248,7 +260,10 @@ class PacedReader:
             if isinstance(move, ReadMove):
                 yield move
             else:
-                yield ReadMove(refuse=move.statement.refuse, task=task, q=position, share=float(share))
+                duration = move.duration or np.nan
+                yield ReadMove(
+                    refuse=move.statement.refuse, task=task, q=position, share=float(share), duration=duration
+                )
 
     def _move_forms(self) -> Iterator[tuple[re.Pattern[str], Which | None, str | None]]:
         """Patterns of all motions of a tool, with what each does to the process, and of which task."""
@@ -290,23 +305,32 @@ class PacedReader:
             self._require_frames(statement, words, task)
             for name in () if which in {None, "inner"} else self._events.triggers(task, which == "on"):
                 self._data.require(statement, name, "triggdata")
-            speed = value_of(self._data.require(statement, words["speed"], "speeddata"))
+            speed = self._data.require(statement, words["speed"], "speeddata")
+            feed = value_of(speed)[0] / MM
             points = [self._point(statement, words[slot]) for slot in ("via", "point") if words.get(slot)]
-            external = points[-1][2]
+            poses = tuple(point[0] for point in points)
+            self._require_speeds(speed, turn_speed([*self._here, *poses], feed))
             zone = 0.0 if words["zone"] == "fine" else self._zone(statement, words["zone"])
             q = np.full(len(self._unit.robot.model.joints), np.nan)
-            q[list(self._unit.axes.external)] = external
+            q[list(self._unit.axes.external)] = points[-1][2]
             return ReadMove(
                 refuse=statement.refuse,
                 task=task,
                 q=q,
-                poses=tuple(point[0] for point in points),
+                poses=poses,
                 configurations=tuple(point[1] for point in points),
-                feed=speed[0] / MM,
+                feed=feed,
                 zone=zone,
                 process=which,
             )
         return None
+
+    def _require_speeds(self, speed: Datum, turn: float) -> None:
+        """A turn of the tool in [deg/s] and external axes slow no line below the speed of the tool."""
+        least = axis_speeds(self._unit, [turn])
+        if any(stated < needed - LAST for stated, needed in zip(value_of(speed)[1:], least, strict=True)):
+            words = "{} deg/s of the turn, {} mm/s and {} deg/s of external axes".format(*least)
+            speed.statement.refuse(f"at least {words}, so that they slow no line", f"{speed.value}")
 
     def _require_frames(self, statement: RapidStatement, words: Mapping[str, str], task: str) -> None:
         """The motion is in the work object of its task, with the tool of the robot."""
