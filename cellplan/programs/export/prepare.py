@@ -20,6 +20,7 @@ from cellplan.programs.promises.promises import Promised, choose_promise, contro
 from cellplan.programs.promises.run_programs import run_programs
 from cellplan.programs.promises.skew import RunSkew, run_skew
 from cellplan.programs.promises.stations import stations
+from cellplan.programs.rows.feeds import feeds_in_step
 from cellplan.programs.rows.part_targets import with_part_poses
 from cellplan.programs.rows.resample import lead_time, resampled
 from cellplan.programs.rows.rows import essential_rows, full_rows
@@ -85,7 +86,7 @@ def prepare(
     has_waits = promised.promise.waits and len(run.cell.robots) > 1
     orders = shared.orders(progress) if has_waits else ()
     try:
-        job, lead, by_joints = _job(shared, dialect, choice, frame=frame, orders=orders)
+        job, lead, remarks = _job(shared, dialect, choice, frame=frame, orders=orders)
     except _NoLineError as error:
         if choice.promise is Promise.PACED:
             raise
@@ -94,12 +95,13 @@ def prepare(
     stops, count = stops_left(job) if is_rounded else (0, 0)
     if stops > FEW_STOPS * count and not choice.is_thinned and not dialect.has_seams(frame):
         finer = replace(choice, thin_mm=FINER * THIN_MM, thin_deg=FINER * THIN_DEG)
-        other, *_ = _job(shared, dialect, finer, frame=frame, orders=orders)
-        job, choice = (other, finer) if stops_left(other)[0] < stops else (job, choice)
+        other, _, said = _job(shared, dialect, finer, frame=frame, orders=orders)
+        if stops_left(other)[0] < stops:
+            job, choice, remarks = other, finer, said
     return PreparedExport(
         dialect=dialect,
         job=job,
-        promised=replace(promised, remarks=(*promised.remarks, *by_joints)),
+        promised=replace(promised, remarks=(*promised.remarks, *remarks)),
         requested=choice.promise,
         skew=skew if promised.promise is Promise.TIMED else None,
         orders=orders,
@@ -112,7 +114,7 @@ def prepare(
 def _job(
     shared: Shared, dialect: Dialect, choice: Choice, *, frame: ExportFrame, orders: Sequence[Orders]
 ) -> tuple[ExportJob, float, tuple[str, ...]]:
-    """The rows of an export, rounded as far as the cell allows it; and by how much they are later."""
+    """The rows of an export, rounded as far as the cell allows it; by how much they are later; remarks for the head."""
     programs, lead = _shaped(shared, dialect, choice, frame=frame, orders=orders)
     if dialect.states_poses(frame):
         programs = with_part_poses(frame, programs)
@@ -122,7 +124,8 @@ def _job(
         read = None if as_poses else dialect.read(frame, dialect.render(job))
         job = with_rounding(dialect, job, shared=shared, read=read, orders=orders, lead=lead)
     if not dialect.has_seams(frame):
-        return job, lead, ()
+        every, essential = full_rows(shared.run), essential_rows(shared.run)
+        return job, lead, tuple(feeds_in_step(job.programs, every, essential)) if dialect.states_poses(frame) else ()
     most = (THIN_MM if choice.thin_mm is None else choice.thin_mm) / MM
     job, by_joints = _with_lines(shared, dialect, job, _with_orders(full_rows(shared.run), orders), most=most)
     return job, lead, tuple(_moved_by_joints(frame, by_joints))
