@@ -38,9 +38,9 @@ def feeds_in_step(
                 passed.setdefault(task.robot, []).append(steps[:, is_on & np.isfinite(lengths)])
     for name, parts in passed.items():
         shares, lengths = np.concatenate(parts, axis=1)
-        way = float(lengths[shares >= 1.0 - HELD].sum() / max(lengths.sum(), STANDS))
-        if way < 1.0:
+        covered = float(lengths[shares >= 1.0 - HELD].sum() / max(lengths.sum(), STANDS))
+        if covered < 1.0:
             least = f", and goes down to {shares.min():.0%}"
-            yield f"at the stated times the tool of '{name}' has its feed on {way:.0%} of its way in process{least}"
+            yield f"at the stated times the tool of '{name}' has its feed on {covered:.0%} of its way in process{least}"
         elif shares.size:
             yield f"at the stated times the feed on the part holds for the tool of '{name}'"
