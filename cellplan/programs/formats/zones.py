@@ -18,6 +18,7 @@ from cellplan.programs.elements.corners import LARGEST_SHARE
 from cellplan.programs.elements.paced import Move, ReadMove
 
 HALVINGS: Final = 24  # of the search for a share, to 3e-8
+LEAST_SHARE: Final = 1e-6  # [-] of a row that is no stop, however near to it it is rounded
 STANDS: Final = 1e-9  # [rad] or [m] axes that move less in a segment do not count
 
 
@@ -89,7 +90,10 @@ def with_shares(robot: Robot, moves: Sequence[ReadMove], zones: Sequence[float])
     for place, (move, zone) in enumerate(zip(moves, zones, strict=True)):
         if zone > 0.0 and any(other.poses for other in moves[max(place - 1, 0) : place + 2]):
             move.refuse("a stop beside a seam", "a rounded row")
-    return [move if move.poses else replace(move, share=share) for move, share in zip(moves, shares, strict=True)]
+    return [
+        move if move.poses else replace(move, share=max(share, LEAST_SHARE) if zone > 0.0 else 0.0)
+        for move, share, zone in zip(moves, shares, zones, strict=True)
+    ]
 
 
 def axis_zones(robot: Robot, q: Array, share: Array | float) -> Array:

@@ -131,7 +131,7 @@ CODE: dict[str, tuple[str, str, str]] = {  # what is replaced once, what by, and
     "points exchanged": ("movel(p_seam[0]", "movel(p_seam[4]", "p_seam[0]: all values in order"),
     "point left out": ("  movel(p_seam[1],tTool[0],mMove[3])\n", "", "p_seam[1]: all values in order"),
     "feed of the approach": ("mMove[3]", "mMove[2]", "as a stop ends its process"),
-    "feed of the joints": ("mMove[3]", "mMove[1]", "as a stop ends its process"),
+    "feed of the joints": ("mMove[3]", "mMove[1]", "a motion descriptor with accel=100"),
     "process rounded": ("tTool[0],mMove[4]", "tTool[0],mMove[3]", "a stop where a process goes on or off"),
     "no stop before on": ("  waitEndMove()\n  doGas=true", "  doGas=true", "after waitEndMove()"),
     "on and off exchanged": ("doGas=true\n  doArc=true", "doArc=false\n  doGas=false", "expected"),

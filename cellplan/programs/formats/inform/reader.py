@@ -129,8 +129,8 @@ def motions_of(job: JobFile) -> Iterator[Motion | Statement]:
             if here is None or is_behind_arc or len(rest) < ARC - 1 or not _repeats(motion, here):
                 raise statement.error("MOVC to where the tool is, through a point and to the end; MOVL between arcs")
             through, end = (_motion(inner, unused) for inner in rest[: ARC - 1])
-            if not through.level or {inner.words[1] for inner in rest[: ARC - 1]} != {statement.words[1]}:
-                raise through.statement.error("a point of an arc that is passed, at the speed of its start")
+            if through.level != 1 or {inner.words[1] for inner in rest[: ARC - 1]} != {statement.words[1]}:
+                raise through.statement.error("a point of an arc with PL=1, at the speed of its start")
             motion, place = end._replace(positions=(*through.positions, *end.positions)), place + ARC - 1
         here, is_behind_arc, place = motion, statement.kind == "MOVC", place + 1
         yield motion

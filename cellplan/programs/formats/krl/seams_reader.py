@@ -276,7 +276,8 @@ class _Player:
         placed = self.frame.robot(self.robot)
         axes, external = Axes.of(placed), np.array(poses[-1].external)
         first, count = len(axes.external), external_axes(self.frame, self.robot)
-        if any(pose.status_and_turn is None for pose in poses) or np.any(external[count:]):
+        unused = [number for pose in poses for number in pose.external[count:]]
+        if any(pose.status_and_turn is None for pose in poses) or any(unused):
             raise statement.error("points that are declared as E6POS, with external axes that the robot has")
         self.positioners += [pose.external[first:count] for pose in poses]
         written = np.zeros((1, len(placed.model.joints)))

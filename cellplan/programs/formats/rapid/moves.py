@@ -18,7 +18,8 @@ _SPEEDS: Final = frozenset(
 )
 _EXTENDED: Final = {0: 0.3, 1: 1.0, 5: 8.0, 10: 15.0, 15: 23.0, 20: 30.0, 30: 45.0, 40: 60.0, 50: 75.0} | {
     size: 1.5 * size for size in (60, 80, 100, 150, 200)
-}  # [mm] zones of the language with the size in which axes and orientation are rounded; 0.1 deg for each of them
+}  # [mm] zones of the language with the size in which axes and orientation are rounded
+TURN: Final = 0.1  # [deg] of a turn for each [mm] of a zone, as the zones of the language have it
 _FINE: Final = "fine"
 LARGEST_ID: Final = 2**24  # whole numbers up to it are exact in a num of the controller
 
@@ -83,7 +84,7 @@ def _zone(statement: RapidStatement, name: str, data: RapidData) -> Zone:
     """A zone of the language, or one that is declared; what is rounded most of tool, orientation and axes counts."""
     if name.lower().startswith("z") and name[1:].isdigit() and int(name[1:]) in _EXTENDED:
         size = _EXTENDED[int(name[1:])]
-        return Zone(size, 0.1 * size, size)
+        return Zone(size, TURN * size, size)
     is_fine, *sizes = value_of(data.require(statement, name, "zonedata"))
     if is_fine:
         statement.refuse("a zone that rounds, or fine", name)

@@ -29,18 +29,19 @@ from cellplan.programs.elements.paced import (
 )
 from cellplan.programs.elements.text import fixed, safe_names
 from cellplan.programs.formats.rapid.data import RapidData
-from cellplan.programs.formats.rapid.moves import STOP, Place, RapidMove, read_move
+from cellplan.programs.formats.rapid.moves import STOP, TURN, Place, RapidMove, read_move
 from cellplan.programs.formats.rapid.rows import UNIT_TOL, rounding, rows_of
 from cellplan.programs.formats.rapid.speeds import axis_speeds, turn_speed
 from cellplan.programs.formats.rapid.targets import frame_text, joint_targets, part_targets
 from cellplan.programs.formats.rapid.text import Datum, RapidStatement, plain_statement, value_of
 from cellplan.programs.formats.rapid.units import DECIMALS, LONGEST_NAME, RESERVED, TASKS, ZONES, RapidUnit, rapid_task
-from cellplan.programs.formats.zones import on_scale
+from cellplan.programs.formats.zones import LEAST_SHARE, on_scale
 
 LONGEST_ROUTINE: Final = LONGEST_NAME - 5  # room for the number of a point
 WAIT_DECIMALS: Final = 3
 LAST: Final = 1  # [deg/s] by which rounding changes a turn
 NEAR: Final = 1.5e-4  # [mm] or [-] rounding of a frame; a quaternion has more decimals
+ZONE_TOL: Final = 1e-3  # [mm] or [deg] rounding of a zone
 TRIGGER: Final = "trigg"  # data of outputs that are switched ahead, with their number
 SLOTS: Final = ("point", "via", "speed", "zone", "tool", "frame")
 POSE: Final = re.compile(r"\[\[([^\[\]]*)\],\[([^\[\]]*)\],\[([^\[\]]*)\],\[([^\[\]]*)\]\]")
@@ -260,9 +261,13 @@ class PacedReader:
             if isinstance(move, ReadMove):
                 yield move
             else:
-                duration = move.duration or np.nan
+                least = LEAST_SHARE if move.zone != STOP else 0.0  # however little, as where nothing follows
                 yield ReadMove(
-                    refuse=move.statement.refuse, task=task, q=position, share=float(share), duration=duration
+                    refuse=move.statement.refuse,
+                    task=task,
+                    q=position,
+                    share=max(float(share), least),
+                    duration=move.duration or np.nan,
                 )
 
     def _move_forms(self) -> Iterator[tuple[re.Pattern[str], Which | None, str | None]]:
@@ -347,9 +352,13 @@ class PacedReader:
                 datum.statement.refuse(f"{work_object_text(self._frame, station)} as the cell has it")
 
     def _zone(self, statement: RapidStatement, name: str) -> float:
-        """Distance in [m] within which a declared zone rounds."""
-        value = value_of(self._data.require(statement, name, "zonedata"))
-        return float(max(value[1:4])) / MM
+        """Distance in [m] within which a declared zone rounds; its angles in [deg] are a tenth of it in [mm]."""
+        datum = self._data.require(statement, name, "zonedata")
+        is_fine, reach, *others = value_of(datum)
+        turn = TURN * reach
+        if is_fine or np.abs(np.subtract(others, [reach, reach, turn, reach, turn])).max() > ZONE_TOL:
+            datum.statement.refuse("a zone that rounds, with one distance and angles of a tenth of it")
+        return float(reach) / MM
 
     def _point(self, statement: RapidStatement, name: str) -> tuple[Array, list[int], Array]:
         """Pose, configuration and external axes of a declared point, each used once."""

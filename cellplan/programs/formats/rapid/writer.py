@@ -39,7 +39,7 @@ from cellplan.programs.elements.handshake import first_steps, handshake_steps, s
 from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.joints import from_numbers, to_numbers
 from cellplan.programs.elements.text import comment, fixed, joined, safe_names
-from cellplan.programs.formats.rapid.moves import LARGEST_ID
+from cellplan.programs.formats.rapid.moves import LARGEST_ID, TURN
 from cellplan.programs.formats.rapid.paced import PacedWriter, signal_text
 from cellplan.programs.formats.rapid.reader import read_rapid
 from cellplan.programs.formats.rapid.targets import configuration, frame_text, joint_targets, part_targets
@@ -73,7 +73,6 @@ LINE_END: Final = "\r\n"
 ID_STEP: Final = 10
 UNKNOWN_MASS: Final = 0.001  # [kg] as a controller refuses a tool without mass
 SMALLEST_TOOL: Final = 50  # [um] a smaller zone of a tool is a stop
-TURN: Final = 0.1  # [deg] of a turn for each [mm] of a zone, as the zones of the language have it
 
 
 def render_rapid(job: ExportJob) -> dict[str, str]:

@@ -45,6 +45,7 @@ from cellplan.programs.formats.val3.project_text import array_lines
 from cellplan.programs.formats.zones import shares_off_seams, tool_zones
 
 NO_LIMIT: Final = "99999"  # [mm/s] and [deg/s] of the tool: the axes are what limits
+EVEN: Final = {"accel": "100", "decel": "100", "rmax": NO_LIMIT}  # of every motion descriptor
 SPEED_DECIMALS: Final = 3  # of a millimetre in a second
 ZONE_DECIMALS: Final = 3  # of a millimetre
 SMALLEST_ZONE: Final = 0.05  # [mm] a smaller zone of joints is a stop; on a seam a stop would end the process
@@ -214,6 +215,6 @@ class SeamWriter:
         size = floor(zone * 10**ZONE_DECIMALS) / 10**ZONE_DECIMALS
         is_rounded = size >= SMALLEST_ZONE or (blend == "Cartesian" and size > 0.0)
         text = fixed(size, ZONE_DECIMALS) if is_rounded else "0"
-        values = {"accel": "100", **speed, "decel": "100", "rmax": NO_LIMIT}
+        values = {"accel": EVEN["accel"], **speed, **EVEN}
         values |= {"blend": blend if is_rounded else "off", "leave": text, "reach": text}
         return self.descriptors.setdefault(tuple(values.items()), len(self.descriptors))

@@ -18,6 +18,8 @@ from cellplan.programs.formats.val3.data import Data
 from cellplan.programs.formats.val3.names import JOINTS, PART, START, STOP, TOOL
 from cellplan.programs.formats.val3.reader import ReadProject, read_project
 from cellplan.programs.formats.val3.seams import (
+    EVEN,
+    NO_LIMIT,
     STAUBLI,
     libraries,
     part_of,
@@ -94,6 +96,8 @@ class _SeamPlayer:
         """All rows, once everything was followed."""
         programs = dict(self._project.programs)
         start, stop = programs.pop(START), programs.pop(STOP)
+        if len(stop.code) != 1:
+            raise stop.end.error("resetMotion() once in stop", f"{len(stop.code)} statements")
         for node in (*stop.code, *start.code):
             if (_statement(node).kind == "RESET") is not (node in stop.code):
                 raise _statement(node).error("resetMotion() alone in stop")
@@ -148,6 +152,9 @@ class _SeamPlayer:
         self._zones.append(zone / MM if is_joint else 0.0)
         expected = JOINTS if is_joint else points_name(routine_names_of(self._tasks, task))
         values = [self._value(statement, name, index, expected) for name, index in zip(names, indices, strict=False)]
+        usual = EVEN | ({"tmax": NO_LIMIT} if is_joint else {"vel": "100"})
+        if any(descriptor.get(key, text) != text for key, text in usual.items()):
+            raise statement.error(f"a motion descriptor with {' '.join(f'{it}={text}' for it, text in usual.items())}")
         if is_joint:
             numbers = np.array([[float(values[0].get(f"j{axis}", "0")) for axis in range(1, 7)]])
             return ReadMove(refuse=statement.refuse, task=task, q=from_numbers(self._robot, numbers)[0])
