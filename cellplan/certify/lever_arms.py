@@ -110,6 +110,13 @@ class LeverArms:
         down = [] if seen_by is None else self._path_down(seen_by, cell.robot(seen_by).model.flange_link)
         return self._between(down, self._path_down(robot, placed.model.flange_link), _Held(tip, 0.0, tip[None], 0.0))
 
+    def from_tip(self, robot: str, index: int) -> float:
+        """No point of an engine's body on the flange link of a robot is farther from its tool tip, in [m]."""
+        placed, seen = self._scene.cell.robot(robot), self._scene.engine.bodies[index]
+        tip = (placed.model.X_BF @ placed.tool.X_FT)[:3, 3]
+        ends = _moved(self._scene.carrier(index).X_BS, seen.ends)
+        return float(np.linalg.norm(ends - tip, axis=-1).max()) + seen.girth
+
     def flange(self, robot: str, *, radius: float) -> tuple[Chain, Array]:
         """The joints between the ground and a ball round the flange of a robot, of a radius in [m].
 

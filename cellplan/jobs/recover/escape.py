@@ -258,7 +258,7 @@ def _rows_back(rows: RobotRows) -> list[int]:
     """Rows along which a robot goes back: all that were read, and on seams those between which joints move evenly."""
     is_inner = np.zeros(len(rows), dtype=bool)
     if rows.tube is not None:
-        on_seam = np.any(rows.tube[:, 2:] > 0.0, axis=1)
+        on_seam = np.any(rows.tube[:, 4:] > 0.0, axis=1)
         is_inner[1:-1] = on_seam[:-1] & on_seam[1:]
     return bends(rows.q, BENDS, needed=[*np.flatnonzero(~is_inner).tolist(), *rows.marks])
 
@@ -270,7 +270,7 @@ def _off(prepared: PreparedExport, rows: RobotRows, stretch: slice, angle: Angle
     robot, count = prepared.job.frame.robot(rows.robot), rows.q.shape[1]
     numbers = [exact_numbers(robot, q, angle=angle) for q in (rows.q, rows.q + corner_vectors(timed, shares))]
     units = [exact_numbers(robot, q, angle=angle) for q in (np.eye(count), np.zeros((count, count)))]
-    tube = row_tube(rows) @ np.abs(units[0] - units[1])
+    tube = row_tube(rows)[:, 2:] @ np.abs(units[0] - units[1])
     least, decimals = (OFF_RADIANS, 6) if angle is Angle.RADIANS else (OFF, 4)
     off = (np.linalg.norm(numbers[1] - numbers[0], axis=1) + np.linalg.norm(tube, axis=1))[stretch]
     return f"{least + off.max(initial=0.0):.{decimals}f}"

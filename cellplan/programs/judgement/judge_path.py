@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 
+from cellplan.certify.bound import Bound
 from cellplan.certify.certify import certify
 from cellplan.certify.lever_arms import LeverArms
-from cellplan.certify.run_pairs import scene_of_run
+from cellplan.certify.run_pairs import scene_of_rows, scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.checks.clearance.tool_depth import check_depths
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
@@ -40,6 +41,8 @@ from cellplan.programs.rows.played import ExecutedProgram, ExecutedStretch
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 
+LOOKED_AT: Final = 400  # rows of a motion at which pairs are looked for that may be too near
+
 Errors = TypeVar("Errors", TaskAccuracy, ClosureAccuracy)
 
 
@@ -57,7 +60,7 @@ class PathRows:
     # how far all joints may be off together at each time by rounding, with sign, shape (M, nq); see
     # ``margins.corners_at``
     corners: Array
-    # how far tools and joints may be from straight motion on seams in each step, shape (M - 1, 2 + n), by robot; see
+    # how far tools and joints may be from straight motion on seams in each step, shape (M - 1, 4 + n), by robot; see
     # ``margins.tubes_at``
     tubes: Mapping[str, Array] = field(default_factory=dict)
 
@@ -76,8 +79,21 @@ class PathRows:
         """How far all joints may be off in each step, in [rad] or [m], shape (M - 1, nq)."""
         off = self.off + in_steps(self.corners)
         for name, tube in self.tubes.items():
-            off[:, self.scene.cell.columns(name)] += tube[:, 2:]
+            off[:, self.scene.cell.columns(name)] += tube[:, 4:]
         return off
+
+    @property
+    def tips_off(self) -> dict[str, Array]:
+        """How far tips of tools may be in each step in [m] and turned in [rad], shape (M - 1, 2), by robot.
+
+        Infinite where it follows from the joints alone.
+        """
+        is_off = self.off + in_steps(self.corners) > 0.0
+        columns = {name: self.scene.cell.columns(name) for name in self.tubes}
+        return {
+            name: np.where(np.any(is_off[:, columns[name]], axis=1)[:, None], np.inf, tube[:, 2:4])
+            for name, tube in self.tubes.items()
+        }
 
     def tool_off(self, relation: Relation) -> Array:
         """By how much a tool may be off on the part at each time in [m], and turned in [rad], shape (M, 2).
@@ -137,7 +153,7 @@ def keeps_tools(rows: PathRows) -> bool:
 def keeps_clearance(rows: PathRows) -> bool:
     """Whether bodies keep the distances that are demanded of them."""
     scene = _demanding(rows)
-    return certify(scene, rows.stacked[rows.is_break], with_minimum=False, with_curves=False).is_met
+    return certify(scene, rows.stacked[rows.is_break], with_minimum=False).is_met
 
 
 def _checks(rows: PathRows) -> list[Check]:
@@ -228,9 +244,11 @@ def clearance_findings(rows: PathRows) -> Iterator[str]:
     """The pairs of bodies that touch or are not proved to keep their distance, with what of it rounding takes."""
     scene = _demanding(rows)
     q = stacked_positions(scene.cell, rows.q)[rows.is_break]
-    if certify(scene, q, with_minimum=False, with_curves=False).is_met:
+    verdict = certify(scene, q, with_minimum=False)
+    if verdict.is_met:
         return
-    bound = certify(scene, q, with_curves=False)  # what ended at its first fault says little of the pairs
+    suspects = _suspects(scene, q, verdict)
+    bound = certify(scene_of_rows(scene, suspects), q, with_curves=False)  # the verdict ended at its first fault
     for pair in bound.pairs:
         if pair.is_met:
             continue
@@ -242,14 +260,27 @@ def clearance_findings(rows: PathRows) -> Iterator[str]:
             proof = f"come as near as {MM * pair.distance:.4g} mm or nearer"
         if pair.touches:
             proof = "touch"
-        usual = rows.scene.pairs[pair.row]
+        usual = rows.scene.pairs[suspects[pair.row]]
         added = pair.demand - (usual.demand if usual.rule is Rule.CLEARANCE else 0.0)
         wide, cure = "", "let them pass farther apart"
         if rows.is_off and added > 0.0:
-            wide = f", {MM * added:.2g} mm of it for what rows may be off by rounding"
+            why = (
+                "corners, weave and sensors on seams, and for rounding"
+                if rows.tubes
+                else "what rows may be off by rounding"
+            )
+            wide = f", {MM * added:.2g} mm of it for {why}"
             cure = f"leave out less (--thin-mm, --thin-deg), so that rounding takes less, or {cure}"
         demanded = f"demanded {MM * pair.demand:.4g} mm{wide}"
         yield f"clearance: {first} and {second} {proof}, at {at_s:.3f} s, {demanded}; {cure}"
+
+
+def _suspects(scene: Scene, q: Array, verdict: Bound) -> list[int]:
+    """Pairs that the verdict on a motion found at fault, and those that are too near in some of its rows."""
+    demands = np.array([pair.least_distance for pair in scene.pairs])
+    near = scene.near(q[:: max(1, len(q) // LOOKED_AT)], float(demands.max(initial=0.0)))
+    at_fault = [row for row, it in enumerate(verdict.states) if it.touches or it.unproved or it.distance < it.demand]
+    return sorted({*at_fault, *near.rows[near.distances < demands[near.rows]].tolist()})
 
 
 def _demanding(rows: PathRows) -> Scene:
@@ -257,7 +288,7 @@ def _demanding(rows: PathRows) -> Scene:
     scene = scene_of_run(rows.scene, [scheduled.task.name for scheduled in rows.schedule.tasks])
     if not rows.is_off:
         return scene
-    return raised(LeverArms(scene, rows.stacked), scene, rows.joints_off)
+    return raised(LeverArms(scene, rows.stacked), scene, rows.joints_off, rows.tips_off)
 
 
 def schedule_at(schedule: Schedule, times: Array) -> Schedule:

@@ -116,8 +116,7 @@ def blocked_orders(
 ) -> Iterator[tuple[int, str]]:
     """Places of the stretches of a program in which a pair is not clear in every order, with what is not.
 
-    Robots that are not exported have the rows of the run. Corners say how far each robot may be off at its rows by
-    rounding, in [rad] or [m], shape (N, n).
+    Robots that are not exported have the rows of the run. Corners are those of ``margins.robot_corners``.
     """
     scenes = scenes_of(run)
     program = next(program for program in run_programs(run) if program.name == orders.program)
@@ -126,13 +125,13 @@ def blocked_orders(
         progress(STAGE, count / len(orders.stretches))
         if not stretch.pairs:
             continue
-        q, off = _positions(run.cell, program, rows, count, stretch), _off(run.cell, rows, corners, count)
-        key = (str(stretch.place).encode(), *(positions.tobytes() for positions in q.values()), off.tobytes())
+        q, (off, tips) = _positions(run.cell, program, rows, count, stretch), _off(run.cell, rows, corners, count)
+        key = (str(stretch.place).encode(), *(values.tobytes() for values in (*q.values(), off, *tips.values())))
         if key not in known:  # or else a further cycle
             scene, regions = scenes[stretch.place], [_region(q, pair) for pair in stretch.pairs]
             if np.any(off):
                 ends = [np.stack([positions.min(axis=0), positions.max(axis=0)]) for positions in q.values()]
-                scene = raised(LeverArms(scene, np.concatenate(ends, axis=1)), scene, off[None], in_step=False)
+                scene = raised(LeverArms(scene, np.concatenate(ends, axis=1)), scene, off, tips, in_step=False)
             times = program.times[[stretch.first, stretch.last]]
             bounds = certify_regions(scene, q, regions)
             known[key] = [order_finding(stretch.phase, bound, times) for bound in bounds if not bound.is_met]
@@ -229,13 +228,19 @@ def _positions(
     return positions
 
 
-def _off(cell: Cell, rows: ProgramRows, corners: Mapping[str, Array], count: int) -> Array:
-    """How far all joints may be off by rounding between two marks, in [rad] or [m], shape (nq,)."""
-    off = np.zeros(cell.joint_count)
-    for name, robot_rows in rows.robots.items():
-        between = slice(robot_rows.marks[count], robot_rows.marks[count + 1] + 1)
-        off[cell.columns(name)] = corners[name][between].max(axis=0, initial=0.0)
-    return off
+def _off(cell: Cell, rows: ProgramRows, corners: Mapping[str, Array], count: int) -> tuple[Array, dict[str, Array]]:
+    """How far joints may be off at the rows between two marks, of one robot after the other, and tips of their tools.
+
+    In [rad] or [m], shape (M, nq), and in [m] and [rad], shape (M, 2), by robot.
+    """
+    between = {name: slice(it.marks[count], it.marks[count + 1] + 1) for name, it in rows.robots.items()}
+    values = {name: np.unique(corners[name][rows], axis=0) for name, rows in between.items()}
+    off, tips, first = np.zeros((sum(map(len, values.values())), cell.joint_count)), {}, 0
+    for name, of_robot in values.items():
+        place = slice(first, first := first + len(of_robot))
+        off[place, cell.columns(name)], tips[name] = of_robot[:, 2:], np.zeros((len(off), 2))
+        tips[name][place] = of_robot[:, :2]
+    return off, tips
 
 
 def order_finding(phase: str, bound: RegionBound, times: Array) -> str:

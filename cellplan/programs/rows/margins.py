@@ -16,6 +16,7 @@ with the time h of the segment in which t lies. It is largest at the row and not
 The distance from the two segments is no more than that whatever the pace is.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -34,6 +35,7 @@ from cellplan.scene.scene import Scene
 SHORTEST: Final = 1e-6  # [s] between two rows
 FIRST: Final = ((0, 1), (0, 0))  # steps at the rows at which they begin
 LAST: Final = ((1, 0), (0, 0))  # and end
+NO_TIPS: Final[Mapping[str, Array]] = {}  # joints alone say how far bodies may be off
 
 
 def corner_vectors(rows: RobotRows, shares: Array) -> Array:
@@ -83,24 +85,29 @@ def all_corners(played: ExecutedProgram, times: Array) -> Array:
 def robot_corners(played: ExecutedProgram) -> dict[str, Array]:
     """How far each exported robot may be off at its rows: by rounding, and in its tube.
 
-    In [rad] or [m], shape (N, n), by robot.
+    First how far the tip of its tool may be in [m], and turned in [rad], infinite where this follows from its joints
+    alone, then its joints in [rad] or [m], shape (N, 2 + n), by robot.
     """
     corners = {}
     for name in played.exported:
-        corners[name] = np.abs(corner_vectors(played.rows[name], played.shares[name])) + row_tube(played.rows[name])
+        rows = played.rows[name]
+        joints = np.abs(corner_vectors(rows, played.shares[name]))
+        off = row_tube(rows)
+        off[np.any(joints > 0.0, axis=1), :2] = np.inf
+        corners[name] = off + np.pad(joints, ((0, 0), (2, 0)))
     return corners
 
 
 def row_tube(rows: RobotRows) -> Array:
-    """How far a robot may be off at its rows in its tube, in [rad] or [m], shape (N, n)."""
+    """How far the tip of its tool and the joints of a robot may be off at its rows in its tube, shape (N, 2 + n)."""
     if rows.tube is None:
-        return np.zeros_like(rows.q)
+        return np.zeros((len(rows), 2 + rows.q.shape[1]))
     tube: Array = np.max([np.pad(rows.tube[:, 2:], ends) for ends in (FIRST, LAST)], axis=0)
     return tube
 
 
 def tubes_at(played: ExecutedProgram, times: Array) -> dict[str, Array]:
-    """The tube of each robot that has one, in each step between times in [s], shape (M,), shape (M - 1, 2 + n)."""
+    """The tube of each robot that has one, in each step between times in [s], shape (M,), shape (M - 1, 4 + n)."""
     middle = 0.5 * (times[:-1] + times[1:])
     tubes = {}
     for name in played.exported:
@@ -198,24 +205,37 @@ def holder_of(scene: Scene, relation: Relation) -> str | None:
     return holders[0].robot if holders and not in_world else None
 
 
-def body_reach(arms: LeverArms, scene: Scene, off: Array) -> Array:
-    """No point of an engine's body moves by more in [m] when joints are off, shape (M, nq), shape (bodies, M)."""
+def body_reach(arms: LeverArms, scene: Scene, off: Array, tips: Mapping[str, Array] = NO_TIPS) -> Array:
+    """No point of an engine's body moves by more in [m] when joints are off, shape (M, nq), shape (bodies, M).
+
+    Bodies on the flange of a robot move with its tool, whose tip may be off by so much in [m] and turned in [rad],
+    shape (M, 2), by robot.
+    """
     axes = axes_off(arms, off)
-    return np.array([arms.chain(None, index).reach(axes) for index in range(len(scene.engine.bodies))])
+    reach = np.array([arms.chain(None, index).reach(axes) for index in range(len(scene.engine.bodies))])
+    for name, tip in tips.items():
+        for index in range(len(reach)):
+            body = scene.carrier(index)
+            if body.robot == name and body.link == scene.cell.robot(name).model.flange_link:
+                reach[index] = np.minimum(reach[index], tip @ np.array([1.0, arms.from_tip(name, index)]))
+    return reach
 
 
-def raised(arms: LeverArms, scene: Scene, off: Array, *, in_step: bool = True) -> Scene:
+def raised(
+    arms: LeverArms, scene: Scene, off: Array, tips: Mapping[str, Array] = NO_TIPS, *, in_step: bool = True
+) -> Scene:
     """A scene in which every pair is to keep as much more as joints may bring it nearer.
 
     Pairs that need not keep a distance are to keep this much.
 
-    All joints may be off by so much in [rad] or [m], shape (M, nq): both bodies of a pair in the same step, or else
-    each in any.
+    All joints may be off by so much in [rad] or [m], shape (M, nq), and tips of tools as for ``body_reach``: both
+    bodies of a pair in the same step, or else each in any.
     """
-    off = off[np.any(off > 0.0, axis=1)]
-    if not len(off):
+    is_off = np.any(off > 0.0, axis=1)
+    if not np.any(is_off):
         return scene
-    reach, axes = body_reach(arms, scene, off), axes_off(arms, off)
+    off, tips = off[is_off], {name: tip[is_off] for name, tip in tips.items()}
+    reach, axes = body_reach(arms, scene, off, tips), axes_off(arms, off)
     if not in_step:
         reach, axes = reach.max(axis=1, keepdims=True), axes.max(axis=0, keepdims=True)
     return replace(scene, pairs=tuple(_raised(pair, _nearer(arms, pair, reach, axes)) for pair in scene.pairs))

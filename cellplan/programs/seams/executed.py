@@ -7,6 +7,8 @@ rules of orientation differ, and what a rounded corner cuts. The tube of the joi
 which a controller's own weave and sensors add where bodies are judged:
 
 .. math:: |\delta q_i| \le |J^{-1}_{i,v}| \epsilon_p + |J^{-1}_{i,\omega}| \epsilon_r .
+
+A body on the flange, at most r from the tip, moves by no more than :math:`\epsilon_p + r \epsilon_r`, which is less.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -48,7 +50,7 @@ class SeamPath:
     shares: Array  # shares of its length at the rows, rising from 0 to 1, shape (M,)
     times: Array  # times of the rows in [s], shape (M,)
     q: Array  # joints there in [rad] or [m], shape (M, n)
-    tube: Array  # of the tool in [m] and [rad] and of the joints in each step, shape (M - 1, 2 + n)
+    tube: Array  # in each step, shape (M - 1, 4 + n), see ``RobotRows.tube``
 
 
 class SeamExecution:
@@ -83,13 +85,13 @@ class SeamExecution:
         """
         rows, count = self._rows, self._q.shape[1]
         times, inside = times_of(rows), {seam.first: seam for seam in rows.seams}
-        pieces: list[tuple[Array, Array, Array]] = [(times[:1], self._q[:1], np.zeros((0, 2 + count)))]
+        pieces: list[tuple[Array, Array, Array]] = [(times[:1], self._q[:1], np.zeros((0, 4 + count)))]
         places = [0]
         row = 1
         while row < len(rows):
             seam = inside.get(row - 1)
             if seam is None:
-                pieces.append((times[row : row + 1], self._q[row : row + 1], np.zeros((1, 2 + count))))
+                pieces.append((times[row : row + 1], self._q[row : row + 1], np.zeros((1, 4 + count))))
                 places.append(places[-1] + 1)
                 row += 1
                 continue
@@ -115,7 +117,7 @@ class SeamExecution:
         robots = {}
         for name, columns in self._columns.items():
             is_arm = name == rows.robot
-            parts = [tube[:, :2] if is_arm else np.zeros((len(tube), 2)), tube[:, 2:][:, columns]]
+            tool = tube[:, :4] if is_arm else np.tile([0.0, 0.0, np.inf, np.inf], (len(tube), 1))
             robots[name] = RobotRows(
                 robot=name,
                 q=q[:, columns],
@@ -123,7 +125,7 @@ class SeamExecution:
                 process=process & is_arm,
                 marks=marks,
                 rounding=rounding,
-                tube=np.hstack(parts),
+                tube=np.hstack([tool, tube[:, 4:][:, columns]]),
             )
         return robots
 
@@ -222,7 +224,7 @@ class SeamExecution:
             )
 
     def _tube(self, seam: Seam, shape: Shape, shares: Array, q: Array, *, is_on: bool) -> Array:
-        """The tube of every step, without corners, shape (M - 1, 2 + n)."""
+        """The tube of every step, without corners, shape (M - 1, 4 + n)."""
         middle = shape.poses(0.5 * (shares[:-1] + shares[1:]))
         X = self._on_part(seam, 0.5 * (q[:-1] + q[1:]))
         off = np.linalg.norm(X[:, :3, 3] - middle[:, :3, 3], axis=1)
@@ -230,17 +232,22 @@ class SeamExecution:
         rules = shape.rule_margins(shares)
         tool = np.stack([BENT * off, BENT * turned + np.maximum(rules[:-1], rules[1:])], axis=1)
         judged = tool + np.array([self._form.tube if is_on and self._form else 0.0, 0.0])
-        slack = SLACK if self._dialect.sets_steps else 0.0
-        return np.concatenate([tool, self._joints_off(judged, q) + slack], axis=1)
+        if self._dialect.sets_steps:
+            J = np.linalg.norm(self._jacobians(q).reshape(len(tool), 2, 3, -1), axis=2).sum(axis=2)
+            return np.concatenate([tool, judged + RESERVE * SLACK * J, self._joints_off(judged, q) + SLACK], axis=1)
+        return np.concatenate([tool, judged, self._joints_off(judged, q)], axis=1)
 
     def _joints_off(self, tool: Array, q: Array) -> Array:
         """How far joints may be off in each step for what a tool is, shape (M - 1, 2), shape (M - 1, n)."""
         arm, off = list(Axes.of(self._robot).arm), np.zeros((len(tool), q.shape[1]))
-        J = tip_jacobians(self._chain, q[1:, self._columns[self._robot.name]])[:, :, arm]
-        J_inverse = np.abs(np.linalg.pinv(J))
+        J_inverse = np.abs(np.linalg.pinv(self._jacobians(q)[:, :, arm]))
         reach = np.stack([np.linalg.norm(J_inverse[:, :, part], axis=2) for part in (slice(3), slice(3, 6))], axis=2)
         off[:, arm] = RESERVE * np.einsum("mik,mk->mi", reach, tool)
         return off
+
+    def _jacobians(self, q: Array) -> Array:
+        """Jacobians of the tool tip at the ends of all steps, shape (M - 1, 6, n)."""
+        return tip_jacobians(self._chain, q[1:, self._columns[self._robot.name]])
 
     def _with_corners(self, seam: Seam, paths: Sequence[tuple[int, SeamPath]]) -> Iterator[tuple[int, SeamPath]]:
         """The pieces of a seam with what rounded corners between them cut, added to their tubes."""
@@ -264,8 +271,8 @@ class SeamExecution:
                 steps = near[:-1] | near[1:]
                 q = paths[piece][1].q
                 widened[piece][steps, :2] += on_tool
-                widened[piece][steps, 2:] += self._joints_off(np.tile(on_joints, (len(q) - 1, 1)), q)[steps]
-                widened[piece][steps, 2:] += uneven
+                widened[piece][steps, 2:4] += on_joints
+                widened[piece][steps, 4:] += self._joints_off(np.tile(on_joints, (len(q) - 1, 1)), q)[steps] + uneven
         for (row, path), tube in zip(paths, widened, strict=True):
             yield row, replace(path, tube=tube)
 

@@ -99,12 +99,12 @@ def test_the_tube_of_a_corner_holds_what_the_table_may_cut() -> None:
     rates = [(HELD[3] - HELD[2]) / lengths[0], (HELD[5] - HELD[3]) / lengths[1]]
     cut = 0.25 * radius * np.abs(rates[1] - rates[0])  # in the middle of a parabola
 
-    steps = np.flatnonzero(turning.tube[:, 2:].max(axis=1) > 0.0)
-    assert np.all(turning.tube[steps, 2:] >= 2.0 * cut - 1e-9)
+    steps = np.flatnonzero(turning.tube[:, 4:].max(axis=1) > 0.0)
+    assert np.all(turning.tube[steps, 4:] >= 2.0 * cut - 1e-9)
     assert np.all(np.abs(turning.times[steps] - 3.0) < 0.5)
     stopped = executed(job, is_rounded=False)[ROBOT].tube
     near = np.flatnonzero(np.abs(arm.times[1:] - 3.0) < 0.05)
-    assert np.all(arm.tube[near, 2:].max(axis=1) > stopped[near, 2:].max(axis=1))
+    assert np.all(arm.tube[near, 4:].max(axis=1) > stopped[near, 4:].max(axis=1))
 
 
 def arm_radius(job: ExportJob) -> float:

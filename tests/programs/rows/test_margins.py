@@ -7,8 +7,9 @@ import pytest
 
 from cellplan import load_cell
 from cellplan.certify.lever_arms import LeverArms
+from cellplan.geometry.shapes import Mesh
 from cellplan.model.report.exported import RobotRows
-from cellplan.programs.rows.margins import corners_at, in_steps, raised, tool_corners
+from cellplan.programs.rows.margins import body_reach, corners_at, in_steps, raised, tool_corners
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 
@@ -157,3 +158,34 @@ def test_pairs_are_to_keep_what_joints_may_be_off_besides(scene: Scene) -> None:
             assert other == pair
     assert any(other.demand > pair.demand for pair, other in zip(scene.pairs, more.pairs, strict=True))
     assert raised(LeverArms(scene, q), scene, 0.0 * off).pairs == scene.pairs
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_point_on_the_flange_moves_farther_than_the_tip_and_its_turn_let_it(scene: Scene, seed: int) -> None:
+    """Joints are moved by chance; corners of the hulls on the flange are compared with what the tool does."""
+    rng, cell, robot = np.random.default_rng(seed), scene.cell, scene.cell.tasks[0].robot
+    at = np.tile(rng.uniform(-1.0, 1.0, cell.joint_count), (2, 1))
+    at[1, cell.columns(robot)] += rng.normal(scale=0.01, size=at[1, cell.columns(robot)].shape)
+    tip, other = scene.chains[robot].tool_poses(at[:, cell.columns(robot)])
+    turn = np.arccos(np.clip(0.5 * (np.trace(tip[:3, :3].T @ other[:3, :3]) - 1.0), -1.0, 1.0))
+    tips = {robot: np.array([[np.linalg.norm(tip[:3, 3] - other[:3, 3]), turn]])}
+    off = np.abs(np.diff(at, axis=0))
+
+    arms, poses = LeverArms(scene, at), scene.body_poses(at)
+    by_joints, by_tip = body_reach(arms, scene, off), body_reach(arms, scene, off, tips)
+
+    flange = cell.robot(robot).model.flange_link
+    on_flange = [
+        index
+        for index in range(len(by_tip))
+        if scene.carrier(index).robot == robot and scene.carrier(index).link == flange
+    ]
+    assert on_flange
+    for index in range(len(by_tip)):
+        body = scene.engine.bodies[index]
+        vertices = body.hull.vertices if isinstance(body.hull, Mesh) else body.ends
+        places = np.einsum("nij,vj->nvi", poses.R[index], vertices) + poses.p[index][:, None]
+        assert np.linalg.norm(places[1] - places[0], axis=1).max() <= by_tip[index, 0] + 1e-12
+        assert by_tip[index, 0] <= by_joints[index, 0]
+        assert index in on_flange or by_tip[index, 0] == by_joints[index, 0]
+    assert np.all(by_tip[on_flange] < by_joints[on_flange])
