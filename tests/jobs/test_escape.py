@@ -162,7 +162,7 @@ def test_all_robots_come_home_from_random_stops_and_keep_their_distance_by_brute
                 rows = escapes[form].main.robots[name]
                 row = int(rng.integers(*rows.marks[route.number - 1 : route.number + 1]))
                 q = rows.q[row] + rng.uniform() * (rows.q[row + 1] - rows.q[row])
-                q += 0.0 if rows.tube is None else rng.uniform(-1.0, 1.0, len(q)) * rows.tube[row, 2:]
+                q += 0.0 if rows.tube is None else rng.uniform(-1.0, 1.0, len(q)) * rows.tube[row, 4:]
                 files = {p: t for p, t in escapes[form].escape_files.items() if p.lower().startswith(name)}
                 here = exact_numbers(run.cell.robot(name), q[None], angle=angles[name])[0]
                 robots[name] = Robot(files, route.number, here, float(rng.uniform(0.0, 2.0)))
@@ -292,7 +292,7 @@ def test_one_robot_goes_home_from_any_place_of_its_program(moves: Moves, tmp_pat
     for _ in range(STOPS):
         row = int(rng.integers(len(rows) - 1))
         q = rows.q[row] + rng.uniform() * (rows.q[row + 1] - rows.q[row])
-        q += 0.0 if rows.tube is None else rng.uniform(-1.0, 1.0, len(q)) * rows.tube[row, 2:]
+        q += 0.0 if rows.tube is None else rng.uniform(-1.0, 1.0, len(q)) * rows.tube[row, 4:]
         player = Robot(written.escape_files, 0, exact_numbers(robot, q[None])[0])
 
         def seen(player: Robot = player) -> None:
