@@ -233,21 +233,20 @@ class SeamExecution:
         tool = np.stack([BENT * off, BENT * turned + np.maximum(rules[:-1], rules[1:])], axis=1)
         judged = tool + np.array([self._form.tube if is_on and self._form else 0.0, 0.0])
         if self._dialect.sets_steps:
-            J = np.linalg.norm(self._jacobians(q).reshape(len(tool), 2, 3, -1), axis=2).sum(axis=2)
-            return np.concatenate([tool, judged + RESERVE * SLACK * J, self._joints_off(judged, q) + SLACK], axis=1)
+            J = tip_jacobians(self._chain, q[1:, self._columns[self._robot.name]]).reshape(len(tool), 2, 3, -1)
+            moved = RESERVE * SLACK * np.linalg.norm(J, axis=2).sum(axis=2)
+            return np.concatenate([tool, judged + moved, self._joints_off(judged, q) + SLACK], axis=1)
         return np.concatenate([tool, judged, self._joints_off(judged, q)], axis=1)
 
     def _joints_off(self, tool: Array, q: Array) -> Array:
         """How far joints may be off in each step for what a tool is, shape (M - 1, 2), shape (M - 1, n)."""
         arm, off = list(Axes.of(self._robot).arm), np.zeros((len(tool), q.shape[1]))
-        J_inverse = np.abs(np.linalg.pinv(self._jacobians(q)[:, :, arm]))
+        J_inverse = np.abs(
+            np.linalg.pinv(tip_jacobians(self._chain, q[1:, self._columns[self._robot.name]])[:, :, arm])
+        )
         reach = np.stack([np.linalg.norm(J_inverse[:, :, part], axis=2) for part in (slice(3), slice(3, 6))], axis=2)
         off[:, arm] = RESERVE * np.einsum("mik,mk->mi", reach, tool)
         return off
-
-    def _jacobians(self, q: Array) -> Array:
-        """Jacobians of the tool tip at the ends of all steps, shape (M - 1, 6, n)."""
-        return tip_jacobians(self._chain, q[1:, self._columns[self._robot.name]])
 
     def _with_corners(self, seam: Seam, paths: Sequence[tuple[int, SeamPath]]) -> Iterator[tuple[int, SeamPath]]:
         """The pieces of a seam with what rounded corners between them cut, added to their tubes."""
