@@ -105,6 +105,4 @@ class PathEntry(OneOf):
     @property
     def is_planar(self) -> bool:
         """Whether the path is drawn in a plane of the part frame."""
-        if self.polyline is not None:
-            return self.polyline.plane is not None
-        return self.csv is None
+        return self.polyline.plane is not None if self.polyline is not None else self.csv is None

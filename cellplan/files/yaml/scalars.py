@@ -29,9 +29,7 @@ def plain_value(text: str) -> str | int | float | bool:
         raise SurpriseError("expected a value, got nothing; leave the key out to use its default")
     if text.lower() in OLD_TRUTH_WORDS:
         raise SurpriseError(f"'{text}' can be read as a truth value; write true or false, or put it in quotes")
-    if not text[0].isdigit() and text[0] not in "+-.nNiI":
-        return text
-    return _number_or_text(text)
+    return text if not text[0].isdigit() and text[0] not in "+-.nNiI" else _number_or_text(text)
 
 
 def _number_or_text(text: str) -> str | int | float:

@@ -15,9 +15,7 @@ def acceleration_limit(robot: Robot, index: int) -> tuple[float | None, LimitSou
     if joint.acceleration is not None:
         return joint.acceleration, LimitSource.STATED
     seconds = full_speed_in(rule, index)
-    if seconds is None:
-        return None, LimitSource.NOT_STATED
-    return joint.top_speed / seconds, LimitSource.ASSUMED
+    return (None, LimitSource.NOT_STATED) if seconds is None else (joint.top_speed / seconds, LimitSource.ASSUMED)
 
 
 def acceleration_limits(cell: Cell) -> Array:

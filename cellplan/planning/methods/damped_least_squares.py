@@ -40,9 +40,7 @@ def damped_least_squares(problem: TrackingProblem) -> Callable[[int, Array], Ste
 
 def nearness(inverse: WeightedInverse, settings: DampedLeastSquaresEntry) -> float:
     """What tells how near a singularity is: smallest singular value or manipulability, both of ``J W^-1/2``."""
-    if settings.measure == "singular_value":
-        return inverse.smallest
-    return inverse.manipulability
+    return inverse.smallest if settings.measure == "singular_value" else inverse.manipulability
 
 
 def squared_damping(measure: float, settings: DampedLeastSquaresEntry, *, largest: float | None) -> float:

@@ -154,9 +154,7 @@ def _distance(cell: Cell, task: Relation, X_PT_desired: Array) -> tuple[float, f
         if at_start is None:
             return None
         X_WR = at_start
-    if robot.start is None:
-        return None
-    return tool_distance(ScrewChain(robot), task, robot.start, X_PT_desired, X_WR=X_WR)
+    return None if robot.start is None else tool_distance(ScrewChain(robot), task, robot.start, X_PT_desired, X_WR=X_WR)
 
 
 def _shown(joint: Joint, position: float) -> str:

@@ -179,9 +179,7 @@ class TrackingProblem:
 
     def _drift(self, k: int, q: Array) -> Array | None:
         """Joint velocities that are added to close a cycle, of those joints that may move."""
-        if self.drift is None:
-            return None
-        return self.drift(k, q) * self.mobile(k)
+        return None if self.drift is None else self.drift(k, q) * self.mobile(k)
 
     def _with_goals(self, k: int, q: Array, state: CellState, first: FirstOrder, *, signs: Array) -> FirstOrder:
         """The tasks, with what the secondary goals ask for besides."""

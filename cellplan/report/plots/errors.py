@@ -101,6 +101,4 @@ def error_axis(curves: Sequence[Array], allowed: float, *, unit: str) -> PlotAxi
 
 def readable_unit(largest: float, units: tuple[tuple[str, float], ...]) -> tuple[str, float]:
     """The largest unit in which the value is at least one half, or the smallest of all; the first one for zero."""
-    if largest == 0.0:
-        return units[0]
-    return next((unit for unit in units if largest * unit[1] >= MIN_IN_UNIT), units[-1])
+    return units[0] if largest == 0.0 else next((unit for unit in units if largest * unit[1] >= MIN_IN_UNIT), units[-1])

@@ -68,9 +68,7 @@ class ExtremeRecord(TypedDict):
 
 def number(value: float | None) -> Number:
     """The value with ``SIGNIFICANT`` digits and without -0; None if it is not finite."""
-    if value is None or not math.isfinite(value):
-        return None
-    return float(f"{value:.{SIGNIFICANT}g}") + 0.0
+    return None if value is None or not math.isfinite(value) else float(f"{value:.{SIGNIFICANT}g}") + 0.0
 
 
 def entry_record(entry: Entry, without: Collection[str] = ()) -> Any:

@@ -82,9 +82,7 @@ def _require_fit(stored: StoredRun, cell: Cell) -> None:
 def _configuration(entry: Mapping[str, Any], key: str, robot: Robot) -> Array | None:
     """A configuration of a resolved cell in [rad] or [m], shape (n,); None where it has none."""
     given = entry.get(f"{key}_deg", entry.get(key))
-    if given is None or given == "auto":
-        return None
-    return configuration_in_si(robot.model, given)
+    return None if given is None or given == "auto" else configuration_in_si(robot.model, given)
 
 
 def _straight_moves(stored: StoredRun, cell: Cell) -> dict[str, Array]:

@@ -161,6 +161,4 @@ class BatchChains:
 
 def _last_point(robot: Robot) -> Array:
     """The point of the axis that carries the flange, at zero joints, in B; the base origin without one."""
-    if robot.model.flange_link == BASE:
-        return np.zeros(3)
-    return robot.model.axes[robot.model.flange_link].point_B
+    return np.zeros(3) if robot.model.flange_link == BASE else robot.model.axes[robot.model.flange_link].point_B

@@ -62,9 +62,7 @@ class PlaceVerdict:
 
     def or_better(self, other: "PlaceVerdict | None") -> "PlaceVerdict":
         """This one where it is nearer to passing than an earlier one of the same place, else the earlier one."""
-        if other is None or other.start is None or RANK[self.verdict] > RANK[other.verdict]:
-            return self
-        return other
+        return self if other is None or other.start is None or RANK[self.verdict] > RANK[other.verdict] else other
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -209,9 +209,7 @@ def pools(problem: StartProblem, setting: Setting, rng: np.random.Generator) -> 
 def _finer(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Generator) -> Pool:
     """The pool of one operator, its path at more nodes where no base follows."""
     finer = pool(problem, robot, setting, rng)
-    if len(finer.q):
-        return finer
-    return pool(replace(problem, at_rest=problem.at_rest_fine), robot, setting, rng)
+    return finer if len(finer.q) else pool(replace(problem, at_rest=problem.at_rest_fine), robot, setting, rng)
 
 
 def _with_follower(problem: StartProblem, led: Pool, robot: int, setting: Setting, rng: np.random.Generator) -> Pool:

@@ -100,9 +100,7 @@ def _slope(cell: Cell, robot: str, ranges: Sequence[VaryRange]) -> float:
 
 def _outer_radius(mount: Wedge) -> float:
     """Distance of the corners of a column from its middle in [m]."""
-    if mount.size is not None:
-        return 0.5 * math.hypot(*mount.size)
-    return OUTSIDE * float(mount.radius or 0.0)
+    return 0.5 * math.hypot(*mount.size) if mount.size is not None else OUTSIDE * float(mount.radius or 0.0)
 
 
 def _stands_on(robot: Robot, obstacle: Obstacle) -> bool:

@@ -131,9 +131,7 @@ class State:
 
     def base_shift(self, cell: Cell) -> Array:
         """What a part at rest that stands elsewhere does to all bases, seen from the part, shape (4, 4)."""
-        if cell.part.X_WP is None:
-            return np.eye(4)
-        return cell.part.X_WP @ inverse(pose_of(self.part))
+        return np.eye(4) if cell.part.X_WP is None else cell.part.X_WP @ inverse(pose_of(self.part))
 
     def tip_shift(self, cell: Cell, index: int, at_work: Container[str] | None = None) -> Array:
         """What a changed spin and a changed grasp do to the tool tip of a robot, seen from the tip, shape (4, 4).

@@ -101,9 +101,7 @@ def _ears(points: Array) -> NDArray[np.int64] | None:
         ear = int(ears[0])
         cut.append((behind[ear], left[ear], ahead[ear]))
         left = np.delete(left, ear)
-    if _turn(*flat[left]) < -least:
-        return None
-    return np.array([*cut, left], dtype=np.int64)
+    return None if _turn(*flat[left]) < -least else np.array([*cut, left], dtype=np.int64)
 
 
 def _in_its_plane(points: Array) -> Array | None:
