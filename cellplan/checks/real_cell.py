@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array, inverse, rotation_exp
 from cellplan.measures.tool_errors import part_poses, pose_accuracy
@@ -143,7 +142,7 @@ def _repeatability(errors: Array) -> tuple[Array, Array]:
     return radii, turns
 
 
-def _three(values: NDArray[np.float64]) -> tuple[float, float, float]:
+def _three(values: Array) -> tuple[float, float, float]:
     """Three plain numbers."""
     a, b, c = (float(value) for value in values)
     return a, b, c

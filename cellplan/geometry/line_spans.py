@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.mesh.rays import line_crossings
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
-from cellplan.geometry.transforms import Array
 
 Ends = tuple[Array, Array]  # [m] where lines enter and leave a convex solid, shape (N,); enter > leave: never
 
@@ -16,7 +15,7 @@ Ends = tuple[Array, Array]  # [m] where lines enter and leave a convex solid, sh
 class Spans:
     """Stretches of lines inside a solid, shape (K,) each, sorted by line and along it."""
 
-    line: NDArray[np.intp]  # which line
+    line: Indices  # which line
     enter: Array  # way from the line's point to where it enters, in [m] along its direction
     leave: Array  # way to where it leaves, in [m]
 

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.line_spans import line_spans
 from cellplan.geometry.shapes import Mesh, Solid, support_point
-from cellplan.geometry.transforms import Array
 
 GRAZE_TOL: Final = 1e-5  # [m] an axis free this far to the side, or a back end so near the far side, only touches
 SIDE_TOL: Final = 1e-4  # [m] what the side of a body reaches into a wall along it by less is touching, not depth
@@ -29,8 +28,8 @@ class Columns:
     """Columns of a tool along its z axis, in the tool frame."""
 
     points: Array  # places of the lines across the axis in [m], shape (L, 2)
-    guards: NDArray[np.intp]  # lines beside each that must be about as deep for its depth to count, shape (L, G)
-    line: NDArray[np.intp]  # the line of each column, shape (C,)
+    guards: Indices  # lines beside each that must be about as deep for its depth to count, shape (L, G)
+    line: Indices  # the line of each column, shape (C,)
     back: Array  # where the column begins along z in [m], shape (C,)
     front: Array  # where it ends, shape (C,)
 

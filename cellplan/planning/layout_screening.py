@@ -5,9 +5,8 @@ from dataclasses import dataclass, fields
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.presented import Presented
@@ -15,7 +14,7 @@ from cellplan.model.task.clocked_path import distinct
 from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.settling import settled, settling_joints
-from cellplan.planning.collocation.solver import Collocation, Indices, NullSpaceMotion, Precision, repeated
+from cellplan.planning.collocation.solver import Collocation, NullSpaceMotion, Precision, repeated
 from cellplan.planning.collocation.windows import Window, windows_between
 from cellplan.planning.tracking.given_path import GivenPath
 from cellplan.planning.tracking.motion_task import closures
@@ -109,12 +108,12 @@ class Screening(Presented):
         )
 
     @property
-    def is_followed(self) -> NDArray[np.bool_]:
+    def is_followed(self) -> Flags:
         """Which candidates did the whole job, shape (K,)."""
         return self.lost_at == WHOLE_JOB
 
     @property
-    def is_feasible(self) -> NDArray[np.bool_]:
+    def is_feasible(self) -> Flags:
         """Which did it within all joint limits and speeds, shape (K,); nothing is known of collisions yet."""
         within = np.all(self.margins >= 0.0, axis=1) & np.all(self.speed_ratios <= 1.0, axis=1)
         return self.is_followed & within

@@ -5,9 +5,8 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.name_order import NameOrder
 from cellplan.model.motion.motion import Motion, NearestSingular, Resolution
 from cellplan.model.progress import Progress, silent
@@ -136,7 +135,7 @@ def _with_errors(motion: Motion, task: MotionTask) -> tuple[Motion, Array]:
     return checked, schedule.times[:last][_peaks(errors, task.cell.solver.accuracy_mm.si)]
 
 
-def _peaks(errors: Array, allowed: float) -> NDArray[np.bool_]:
+def _peaks(errors: Array, allowed: float) -> Flags:
     """Where errors, shape (N,), are above what is allowed and not below their neighbours, shape (N,)."""
     padded = np.concatenate([[-np.inf], errors, [-np.inf]])
     return (errors > allowed) & (errors >= padded[:-2]) & (errors > padded[2:])

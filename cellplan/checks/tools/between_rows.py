@@ -18,11 +18,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.certify.lever_arms import LeverArms
-from cellplan.geometry.arrays import Indices
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.measures.tool_errors import error_lengths, part_poses, relative_to_task_frame
 from cellplan.model.cell.cell import Relation, RobotRows, stacked_positions
 from cellplan.model.motion.motion import Schedule
@@ -271,7 +269,7 @@ class _ToolErrors:
     tool: _MeasuredTool
     middle: Array  # errors in the middle of all steps, shape (N - 1, 2)
     bounds: Array  # no error in a step is larger, shape (N - 1, 2)
-    chosen: NDArray[np.bool_]  # steps that were subdivided, shape (N - 1,)
+    chosen: Flags  # steps that were subdivided, shape (N - 1,)
     k: Indices  # indices of the times evaluated, shape (M,)
     s: Array  # shares of these steps, shape (M,)
     fine: Array  # errors there, shape (M, 2)

@@ -5,10 +5,9 @@ from typing import Final
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
-from numpy.typing import NDArray
 
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.curves.curve import Curve, Interval
-from cellplan.geometry.transforms import Array
 
 NODE_COUNT: Final = 12  # Gauss-Legendre nodes of a panel
 PANEL_CHUNK: Final = 4096  # panels worked on at once: about 10 MB
@@ -122,7 +121,7 @@ def measure(curve: Curve) -> ArcLength:
     return ArcLength(edges=edges, behind=behind, series=series)
 
 
-def _halve(edges: Array, chosen: NDArray[np.bool_]) -> Array:
+def _halve(edges: Array, chosen: Flags) -> Array:
     """Edges with the chosen panels cut in two; the old edges are kept to the last bit."""
     middle = 0.5 * (edges[:-1] + edges[1:])
     return np.insert(edges, np.flatnonzero(chosen) + 1, middle[chosen])

@@ -5,9 +5,8 @@ from itertools import pairwise
 from typing import Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags, Indices
 
 Interval = tuple[float | Array, float | Array]  # stretch of the parameter, one or one per point: see spans_at
 
@@ -61,7 +60,7 @@ class BezierCurve:
         return _casteljau(control, x), len(steps) * _casteljau(steps, x) / width
 
 
-def spans_at(knots: Array, u: Array, interval: Interval) -> NDArray[np.intp]:
+def spans_at(knots: Array, u: Array, interval: Interval) -> Indices:
     """Index of the span that holds each parameter; at a knot that ends the interval, the span inside it."""
     first = np.searchsorted(knots, interval[0], side="right") - 1
     last = np.searchsorted(knots, interval[1], side="left") - 1
@@ -111,7 +110,7 @@ def rounded_sides(knots: Array, corners: Array, blend: float) -> BezierCurve:
     return BezierCurve(knots=np.concatenate([edges[:-1][is_long], edges[-1:]]), control=spans[is_long])
 
 
-def smooth_through(knots: Array, values: Array, *, breaks: NDArray[np.bool_]) -> BezierCurve:
+def smooth_through(knots: Array, values: Array, *, breaks: Flags) -> BezierCurve:
     """Cubic curve through values of shape (N, 3) at ``knots``, with continuous derivatives except at the breaks.
 
     Knots increase; ``breaks`` says where the derivative may jump, shape (N,), see `tangents`.
@@ -123,7 +122,7 @@ def smooth_through(knots: Array, values: Array, *, breaks: NDArray[np.bool_]) ->
     return BezierCurve(knots=knots, control=control)
 
 
-def tangents(slopes: Array, widths: Array, breaks: NDArray[np.bool_]) -> tuple[Array, Array]:
+def tangents(slopes: Array, widths: Array, breaks: Flags) -> tuple[Array, Array]:
     """Derivatives at both ends of each span, shape (M, 3) each, so that a parabola through three neighbours is met.
 
     Inside, the derivative is the mean of the neighbouring slopes, weighted with the opposite widths. At a break it

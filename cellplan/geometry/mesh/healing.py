@@ -3,12 +3,10 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.errors import InputError
-from cellplan.geometry.arrays import Indices
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.mesh.counts import components, count_edges, face_volumes, ray_winding, shells
-from cellplan.geometry.transforms import Array
 
 MAX_PIECES: Final = 5000  # [-] an assembly with its screws has some hundreds
 PROBE_COUNT: Final = 64  # [-] triangles of a shell that are tested for lying inside the others
@@ -120,7 +118,7 @@ def _boxes(vertices: Array, faces: Indices, label: Indices, *, count: int) -> tu
     return low, high
 
 
-def _neighbours(faces: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]]:
+def _neighbours(faces: Indices) -> tuple[Indices, Indices, Flags]:
     """Both triangles of each edge that has exactly two, and whether they run through it in the same direction."""
     a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     keys = np.minimum(a, b) * (int(faces.max(initial=0)) + 1) + np.maximum(a, b)

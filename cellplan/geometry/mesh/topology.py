@@ -4,10 +4,9 @@ from itertools import product
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.errors import InputError
-from cellplan.geometry.arrays import Indices
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.mesh.counts import (
     EdgeCount,
     components,
@@ -18,7 +17,6 @@ from cellplan.geometry.mesh.counts import (
 )
 from cellplan.geometry.mesh.healing import encloses, oriented_alike, turn_outward, without_repeats
 from cellplan.geometry.shapes import Mesh
-from cellplan.geometry.transforms import Array
 
 __all__ = [
     "EdgeCount",
@@ -31,7 +29,6 @@ __all__ = [
     "winding_numbers",
 ]
 
-FaceArray = np.ndarray[tuple[int, int], np.dtype[np.int64]]
 
 WELD_FRACTION: Final = 1e-6  # [-] of the largest coordinate: the last of the seven digits that single precision has
 AREA_FRACTION: Final = 1e-12  # [-] of the longest side squared: thinner triangles have no usable normal
@@ -123,12 +120,12 @@ def _merge(vertices: Array, faces: Indices, *, key: Array) -> tuple[Array, Indic
     return vertices[order[is_new]], place[faces]
 
 
-def _has_three_corners(faces: Indices) -> NDArray[np.bool_]:
+def _has_three_corners(faces: Indices) -> Flags:
     """Which triangles still have three different corners."""
     return np.all(faces != np.roll(faces, -1, axis=1), axis=1)
 
 
-def _has_area(vertices: Array, faces: Indices) -> NDArray[np.bool_]:
+def _has_area(vertices: Array, faces: Indices) -> Flags:
     """Which triangles have an area, against their longest side."""
     corner = vertices[faces]
     double_area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)

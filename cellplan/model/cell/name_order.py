@@ -7,9 +7,8 @@ searched and resolved in the order of names does not depend on the order in whic
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell.cell import Cell
 
 
@@ -18,7 +17,7 @@ class NameOrder:
     """A cell in the order of names, and the way from its stacked joint vector to that of the file and back."""
 
     cell: Cell  # the cell in the order of names; the first holder stays the first
-    columns: NDArray[np.intp]  # place in the joint vector of the file of each joint in the order of names, shape (nq,)
+    columns: Indices  # place in the joint vector of the file of each joint in the order of names, shape (nq,)
 
     @classmethod
     def of(cls, cell: Cell) -> "NameOrder":

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.frozen import derive
-from cellplan.geometry.transforms import Array
 from cellplan.model.motion.joint_path import JointPath
 from cellplan.model.motion.plan import Phase, Plan, rows_of
 from cellplan.model.solver import Integrator
@@ -287,7 +286,7 @@ class ClockTable:
     sigma: Array  # nominal time of each row in [s], shape (N,)
     phases: tuple[str, ...]  # name of the phase of each row
     lengths: Mapping[str, Array]  # length of path in [m] behind the tool of each task, shape (N,), by task
-    process: Mapping[str, NDArray[np.bool_]]  # whether the tool of each task is on its path, shape (N,), by task
+    process: Mapping[str, Flags]  # whether the tool of each task is on its path, shape (N,), by task
     # name of what is not part of the program, by the first row after it
     gaps: Mapping[int, str] = field(default_factory=dict)
 

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.curves.arc_length import ArcLength, QuickParameters
 from cellplan.geometry.curves.curve import Curve
 from cellplan.geometry.curves.orientation import Orientation
-from cellplan.geometry.transforms import Array, pose_from, rotation_about
+from cellplan.geometry.transforms import pose_from, rotation_about
 
 TOOL_Z: Final = np.array([0.0, 0.0, 1.0])
 
@@ -103,9 +103,7 @@ class Toolpath:
         pieces = np.clip(np.searchsorted(self.behind, s, side="right") - 1, 0, len(self.stops) - 2)
         return self.targets(pieces, s)[0]
 
-    def targets(
-        self, pieces: NDArray[np.intp], s: Array, *, quick: QuickParameters | None = None
-    ) -> tuple[Array, Array]:
+    def targets(self, pieces: Indices, s: Array, *, quick: QuickParameters | None = None) -> tuple[Array, Array]:
         """Tool poses and their change per length of path.
 
         Args:

@@ -7,9 +7,8 @@ Only the columns of the positioner couple the operators, so that the work grows 
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 
 REGULAR: Final = 1e-10  # share of the largest diagonal entry that keeps a block invertible where its rank is lost
 REFINEMENTS: Final = 2  # [-] of the multipliers: each leaves about 1e-6 of their error, rounding over ``REGULAR``
@@ -35,7 +34,7 @@ class ArrowInverse:
         mobility: Array,
         coupling_weights: Array,
         idle: Array,
-        is_given: NDArray[np.bool_] | None = None,
+        is_given: Flags | None = None,
     ) -> None:
         """Factorise.
 

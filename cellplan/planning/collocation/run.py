@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.geometry.arrays import Indices
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Schedule
@@ -19,7 +20,6 @@ from cellplan.planning.collocation.solver import (
     CONFIGURATION_SHARE,
     Collocation,
     Drift,
-    Indices,
     NullSpaceMotion,
     Precision,
     largest,

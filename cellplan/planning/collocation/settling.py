@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell, Relation
 from cellplan.model.task.task import Frame
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired
@@ -28,7 +27,7 @@ def settling_joints(cell: Cell, tasks: Sequence[Relation]) -> Array:
 
 def settled(
     tasks: BatchTasks, desired: Desired, placement: Placement, start: Array, *, mobile: Array, accuracy: float
-) -> tuple[Array, NDArray[np.bool_]]:
+) -> tuple[Array, Flags]:
     """Start postures with the tools brought to their paths, by Newton's method.
 
     Args:

@@ -15,16 +15,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.planning.collocation.batch_targets import DesiredAt, in_windows
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired, Linearisation
 from cellplan.planning.collocation.redundancy import Redundancy
 from cellplan.planning.collocation.windows import Window
 from cellplan.scene.kinematics.batched import Placement
 
-Indices = NDArray[np.intp]
 Drift = Callable[[Array], Array]  # times in [s], shape (K,), to joint velocities, shape (nq, K)
 Record = Callable[[Window, Indices, Array, Array], None]  # window, cells, q (nq, cells, nodes), bounds (cells,)
 
@@ -43,7 +41,7 @@ class WindowResult:
     """What came of one window."""
 
     q: Array  # configurations at the nodes, shape (nq, cells, nodes)
-    is_settled: NDArray[np.bool_]  # whether the passes came to an end, shape (cells,)
+    is_settled: Flags  # whether the passes came to an end, shape (cells,)
     errors: Array  # bound of the tool errors in the panels, between nodes too, in [m] or [rad], shape (panels, cells)
 
 

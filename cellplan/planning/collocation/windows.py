@@ -7,10 +7,9 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.curves.chebyshev import chebyshev
-from cellplan.geometry.transforms import Array
 from cellplan.model.task.task import TIME_TOLERANCE
 
 NONE: Final = np.zeros(0)
@@ -129,7 +128,7 @@ class Window:
         return np.concatenate([matrix, self.between @ matrix])
 
     @cached_property
-    def panel_of(self) -> NDArray[np.intp]:
+    def panel_of(self) -> Indices:
         """Number of the panel that each of the times belongs to."""
         counts = [panel.degree + 1 for panel in self.panels] + [len(panel.points) for panel in self.panels]
         return np.repeat(np.tile(np.arange(len(self.panels)), 2), counts)

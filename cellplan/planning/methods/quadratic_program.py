@@ -4,9 +4,8 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.planning.methods.support.qp_engine import nearest_to_origin
 from cellplan.planning.methods.support.speed_bounds import JointBounds, VelocityBounds
 from cellplan.planning.tracking.problem import FirstOrder, StepResult, TrackingProblem
@@ -48,7 +47,7 @@ def quadratic_program(problem: TrackingProblem) -> Callable[[int, Array], StepRe
 
 
 def bounded_velocities(
-    tasks: FirstOrder, xdot: Array, bounds: VelocityBounds, *, mobile: NDArray[np.bool_], slack_weight: float
+    tasks: FirstOrder, xdot: Array, bounds: VelocityBounds, *, mobile: Flags, slack_weight: float
 ) -> Array:
     r"""Solve the program of one step.
 

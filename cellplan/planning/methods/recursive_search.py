@@ -5,9 +5,8 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell.cell import Cell
 from cellplan.planning.methods.support.configuration_search import (
     STALLED,
@@ -23,8 +22,6 @@ SMALL_ANGLE: Final = 0.1  # [rad] or [m]: farther from an expansion its first or
 ROUNDS_ON_A_LOOK: Final = 50  # before the cell is checked again: near a singularity all depends on where the joints are
 SMALLEST_TRUST: Final = 1e-9  # [rad] or [m]: where even moves this small gain nothing there is nothing to gain
 AIM: Final = 0.25  # share of the allowed cost that the rounds are to leave to first order
-
-Indices = NDArray[np.intp]
 
 
 def recursive_search(problem: TrackingProblem) -> Callable[[int, Array], StepResult]:

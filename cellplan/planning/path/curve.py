@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.errors import InputError
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.curves.curve import (
     BezierCurve,
     CircleCurve,
@@ -18,7 +18,6 @@ from cellplan.geometry.curves.curve import (
 )
 from cellplan.geometry.curves.spline import spline_through
 from cellplan.geometry.curves.surface_patch import Patch
-from cellplan.geometry.transforms import Array
 from cellplan.model.task.path_direction import outside_of, plane_axes
 from cellplan.model.task.task import (
     CirclePath,
@@ -141,7 +140,7 @@ def _refuse_poor_points(points: Array, is_closed: bool, *, where: str, path: Sam
     refuse_near_points(points, path, where=where, is_closed=is_closed, is_smooth=path is not None and path.is_smooth)
 
 
-def _first(marks: NDArray[np.bool_]) -> int:
+def _first(marks: Flags) -> int:
     """Number, from 1, of the first marked row."""
     return int(np.argmax(marks.reshape(len(marks), -1).any(axis=1))) + 1
 

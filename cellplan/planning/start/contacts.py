@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.seeds import generator
 from cellplan.planning.start.inverse_kinematics import finite_limits, random_configurations
@@ -16,8 +15,6 @@ from cellplan.planning.start.trial_motion import StartTrials
 from cellplan.scene.bodies import Kind, SceneBody
 
 ANYWHERE: Final = 12  # configurations drawn from the whole range of a robot's joints
-
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Indices
 
-Rows = NDArray[np.intp]
+Rows = Indices
 
 ALIKE: Final = 1e-9  # figures nearer than this, as a share of themselves or of 1, are equal: far above rounding
 UNBOUNDED: Final = 1e9  # stands for infinite figures

@@ -4,9 +4,9 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array, inverse
+from cellplan.geometry.arrays import Array, Flags
+from cellplan.geometry.transforms import inverse
 from cellplan.model.cell.cell import Grasp, Relation, Robot
 from cellplan.model.cell.doubts import doubt_about, doubt_about_all
 from cellplan.model.robot.robot import Joint
@@ -27,7 +27,6 @@ from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 ARRIVED: Final = 1e-4  # [m] a tip that comes this near reaches its place
 SHOWN: Final = 3  # contacts that are named at most
-Flags = NDArray[np.bool_]
 ATTEMPTS: Final = 120  # iterations from each seed; the nearest pose is approached linearly, beyond reach
 LONGEST_MOVE: Final = 0.4  # [rad, m] largest change of a joint in one iteration
 SHARE: Final = 0.5  # of error times lever: damping that keeps the linear model honest beyond reach

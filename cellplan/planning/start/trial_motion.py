@@ -6,12 +6,11 @@ from functools import reduce
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.certify.depths import mounted_depths
 from cellplan.certify.run_pairs import rows_moved_by
 from cellplan.errors import NoSolutionError
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell
 from cellplan.model.cell.name_order import NameOrder
 from cellplan.model.motion.motion import Schedule
@@ -121,7 +120,7 @@ class StartTrials:
         """Two bodies that a choice of the search moves and that touch, at a configuration in the order of names."""
         return self._scene.touching(self._order.as_listed(q), among=self.open_pairs)
 
-    def contacts(self, q: Array, *, among: NDArray[np.bool_]) -> list[tuple[str, str]]:
+    def contacts(self, q: Array, *, among: Flags) -> list[tuple[str, str]]:
         """All of some pairs, shape (pairs,), that touch at a configuration in the order of names, shape (nq,)."""
         listed, left = self._order.as_listed(q), among.copy()
         pairs: list[tuple[str, str]] = []
@@ -275,7 +274,7 @@ def _once_through(cell: Cell, task: Task, path: ClockedPath) -> ClockedPath:
     return path if path.task.repeat == 1 else clock_path(cell, task, path.toolpath)
 
 
-def _open_pairs(scene: Scene) -> NDArray[np.bool_]:
+def _open_pairs(scene: Scene) -> Flags:
     """Pairs of bodies that a choice of the search moves; collisions of given configurations are left to the report."""
     given = {None, *(robot.name for robot in scene.cell.robots if robot.start is not None)}
     bodies = scene.bodies
@@ -315,7 +314,7 @@ def _range_shares(cell: Cell, margins: Array) -> Array:
     return np.minimum(margins / np.where(half > 0.0, half, 1.0), 1.0)
 
 
-def present_pairs(scene: Scene, phase: Phase) -> NDArray[np.bool_]:
+def present_pairs(scene: Scene, phase: Phase) -> Flags:
     """Which pairs of a scene do not depend on a home that is still to be found, shape (pairs,)."""
     is_present = np.ones(len(scene.pairs), dtype=bool)
     for name in homeless(scene.cell, phase):

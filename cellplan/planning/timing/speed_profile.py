@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Indices
 
 LEAST: Final = 1e-12  # [-] share of the acceleration limit by which the speeding up of the path counts
 MOST_STEPS: Final = 60  # [-] of Newton's method: as many lines are crossed at most
@@ -53,7 +52,7 @@ class SpeedProfile:
         """Acceleration of the path between its lengths, shape (N - 1,)."""
         return np.diff(self.speeds) / np.diff(self.times)
 
-    def _place(self, times: Array) -> tuple[NDArray[np.intp], Array]:
+    def _place(self, times: Array) -> tuple[Indices, Array]:
         """Interval of each time, and the time since its beginning."""
         inside = np.clip(times, 0.0, self.duration)
         k = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.times) - 2)

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.cell.cell import Cell, Relation
 from cellplan.model.task.task import Frame
 
@@ -30,11 +29,11 @@ class TaskConstraints:
     """
 
     tasks: tuple[Relation, ...]  # the tasks, then the grasps of further holders
-    operators: NDArray[np.intp]  # index of each one's robot in the cell, shape (tasks,)
+    operators: Indices  # index of each one's robot in the cell, shape (tasks,)
     carrier: int | None  # index of the positioner that carries the part frame; None for a part at a fixed pose
-    is_on_part: NDArray[np.bool_]  # whether R is the part frame P rather than the world frame W, shape (tasks,)
-    is_spin_free: NDArray[np.bool_]  # whether the rotation about the tool's own axis is left open, shape (tasks,)
-    constrained: NDArray[np.bool_]  # which of the six components are constrained, shape (tasks, 6)
+    is_on_part: Flags  # whether R is the part frame P rather than the world frame W, shape (tasks,)
+    is_spin_free: Flags  # whether the rotation about the tool's own axis is left open, shape (tasks,)
+    constrained: Flags  # which of the six components are constrained, shape (tasks, 6)
     operator_signs: Array  # ``s_i``, 1 or 0, shape (tasks,)
     carrier_signs: Array  # ``c_i``, -1, 0 or 1, shape (tasks,)
     may_move: Array  # 1 for the joints of robots that may move, 0 for all others, shape (nq,)
@@ -71,7 +70,7 @@ class TaskConstraints:
         """Whether every task constrains all six components, so that no rows need to be picked."""
         return bool(self.constrained.all())
 
-    def column_signs(self, carries_flange: NDArray[np.bool_]) -> Array:
+    def column_signs(self, carries_flange: Flags) -> Array:
         """Sign of each joint in each task: +1 where it moves the tool, -1 where it moves the part, 0 elsewhere.
 
         Args:
@@ -91,7 +90,7 @@ class TaskConstraints:
         return np.where(self.is_on_part[:, None, None], X_WP, np.eye(4))
 
 
-def constrained_components(task: Relation) -> NDArray[np.bool_]:
+def constrained_components(task: Relation) -> Flags:
     """Which components a task constrains, shape (6,); with free spin the two rotations across the tool axis."""
     is_constrained = np.isin(np.arange(6), task.axes)
     if task.is_spin_free:

@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.arrays import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.shapes import HalfSpace, support
 from cellplan.geometry.transforms import transform_points
 from cellplan.model.cell.cell import Cell, RobotRows
@@ -174,7 +173,7 @@ def _between(pair: Sequence[ShownSolid]) -> Array:
     return 0.5 * (clouds[0][first] + clouds[1][second])[None]
 
 
-def _inside(points: Array, surface: Array) -> NDArray[np.bool_]:
+def _inside(points: Array, surface: Array) -> Flags:
     """Which points lie behind all facets of a surface, shape (K, 4, 3): inside a convex one."""
     normals = np.cross(surface[:, 2] - surface[:, 0], surface[:, 3] - surface[:, 1])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-15)

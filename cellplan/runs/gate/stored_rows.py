@@ -12,7 +12,7 @@ from cellplan.files.input.findings import listed, shown
 from cellplan.files.run.clock_table import ClockText, parse_clock
 from cellplan.files.run.joint_tables import MM_PER_M, TableHeader, parse_header, parse_table, program_digest, row_place
 from cellplan.files.run.stored import CLOCK, StoredRun
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.motion.motion import ClockTable, JointTable, Motion
 from cellplan.model.motion.plan import NOT_IN_PROGRAM, Phase, rows_of
@@ -223,9 +223,7 @@ def _clock_findings(written: ClockText, clock: ProgramClock, *, cell: Cell, prog
             yield f":{written.line(row)}: {name}: expected {desired[row]} as in the plan of the cell, got {got[row]}"
 
 
-def _columns(
-    table: ClockTable, demanded: ClockTable
-) -> Iterator[tuple[str, list[object], list[object], NDArray[np.bool_]]]:
+def _columns(table: ClockTable, demanded: ClockTable) -> Iterator[tuple[str, list[object], list[object], Flags]]:
     """Every column with what is written, what is demanded, and where they differ."""
     plain: list[tuple[str, NDArray[Any], NDArray[Any]]] = [
         ("time_s", table.times, demanded.times),

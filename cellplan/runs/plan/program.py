@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Final, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.errors import InputError
 from cellplan.files.run.stored import CLOCK
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.motion.motion import Clock, ClockTable, JointTable, Motion, Schedule
 from cellplan.model.motion.plan import Hold, Interval, Phase, Plan, rows_of
@@ -201,7 +200,7 @@ def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) 
     return replace(plan, phases=tuple(phases), stops=stops, process=process, dwells=tuple(sorted(dwells)))
 
 
-def _within(times: Array, stretches: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+def _within(times: Array, stretches: Sequence[tuple[float, float]]) -> Flags:
     """Whether times in [s], shape (N,), lie in one of some stretches, ends included, shape (N,)."""
     inside = np.zeros(len(times), dtype=bool)
     for begin, end in stretches:

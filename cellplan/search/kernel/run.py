@@ -11,9 +11,8 @@ from functools import cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.planning.collocation.batch_tasks import Desired
 from cellplan.planning.collocation.settling import settled
 from cellplan.planning.collocation.solver import repeated
@@ -49,7 +48,7 @@ class Motions:
     lost_at: Array  # when a tool was lost in [s], shape (K,); -inf before its path, inf where the job is done
 
     @property
-    def is_followed(self) -> NDArray[np.bool_]:
+    def is_followed(self) -> Flags:
         """Which candidates did the whole job, shape (K,)."""
         return np.isposinf(self.lost_at)
 
@@ -202,7 +201,7 @@ def _with_consequences(job: Job, change: Array, rates: Array) -> Array:
     return np.moveaxis(changed, 0, 2)
 
 
-def _completed(job: Job, layouts: Layouts, at: Array, velocities: Array, *, is_settled: NDArray[np.bool_]) -> Motions:
+def _completed(job: Job, layouts: Layouts, at: Array, velocities: Array, *, is_settled: Flags) -> Motions:
     """The motions that passes settled, shape (nq, K, N), and the others run from node to node."""
     q, qd, lost_at = np.moveaxis(at, 0, 2).copy(), np.moveaxis(velocities, 0, 2).copy(), np.full(len(layouts), np.inf)
     others = np.flatnonzero(~is_settled)

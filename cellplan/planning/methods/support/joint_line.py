@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.planning.methods.support.search_cost import Expansion
 
 ROUND: Final = 1e-12  # share of the largest aa: how well a way must be a circle on the axes that count to pass for one
@@ -33,7 +32,7 @@ class JointLines:
     aa: Array  # ``sum a . a``
     nn: Array  # ``sum n . n``
     an: Array  # ``sum a . n``
-    turns: NDArray[np.bool_]  # whether the joint moves the tools on circles, shape (nq,)
+    turns: Flags  # whether the joint moves the tools on circles, shape (nq,)
 
     def gain(self, theta: Array) -> Array:
         """By how much the cost falls when each joint alone moves by theta, shape (..., nq)."""

@@ -9,7 +9,6 @@ from cellplan.model.report.report import ASSUMPTION, MARGIN, ClearanceClass, Cle
 from cellplan.model.units import MM
 from cellplan.report.record.common import Number, number
 
-Accuracies = list[Number]
 # what each class is called
 CLASSES: Final = {"robot_robot": "robot to robot", "part": "part", "self": "own bodies", "environment": "surroundings"}
 
