@@ -156,26 +156,20 @@ def _smooth(points: Array, is_closed: bool) -> PathCurve:
     breaks = np.zeros(len(points), dtype=bool)
     breaks[[0, -1]] = not is_closed
     curve = smooth_through(given, points, breaks=breaks)
-    return PathCurve(
-        curve=curve,
-        stops=given[[0, -1]],
-        given=given,
-        is_closed=is_closed,
-        runs_on=is_closed,
-        bulge=largest_bulge(curve),
-    )
+    return _run_on(curve, given, is_closed=is_closed)
 
 
 def _timed(path: TimedPath) -> PathCurve:
     """Smooth curve over time."""
     curve = spline_through(path.times, path.points, is_closed=path.is_closed)
+    return _run_on(curve, path.times, is_closed=path.is_closed)
+
+
+def _run_on(curve: BezierCurve, given: Array, *, is_closed: bool) -> PathCurve:
+    """A smooth curve through points at parameters, shape (N,), that stops at its ends alone."""
+    bulge = largest_bulge(curve)
     return PathCurve(
-        curve=curve,
-        stops=path.times[[0, -1]],
-        given=path.times,
-        is_closed=path.is_closed,
-        runs_on=path.is_closed,
-        bulge=largest_bulge(curve),
+        curve=curve, stops=given[[0, -1]], given=given, is_closed=is_closed, runs_on=is_closed, bulge=bulge
     )
 
 
