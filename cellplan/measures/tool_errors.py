@@ -25,8 +25,7 @@ def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP:
         q: The operator's positions, shape (N, n).
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """
-    X_WT = chain.tool_poses(q)
-    return pose_accuracy(scheduled, relative_to_task_frame(scheduled.task, X_WT, X_WP))
+    return pose_accuracy(scheduled, relative_to_task_frame(scheduled.task, chain.tool_poses(q), X_WP))
 
 
 def relative_to_task_frame(relation: Relation, X_WT: Array, X_WP: Array) -> Array:

@@ -174,8 +174,7 @@ def _render_rows(robot: Robot, times: Array, q: Array, gaps: Mapping[int, str]) 
     names = ",".join(["time_s", *(f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in joints)])
     scaled = (np.rad2deg(q[:, i]) if joint.is_revolute else q[:, i] * MM_PER_M for i, joint in enumerate(joints))
     written = (plain_decimals(column) for column in (times, *(np.round(column, DECIMALS) for column in scaled)))
-    rows = map(",".join, zip(*written, strict=True))
-    return "\n".join([names, *with_gap_lines(rows, gaps)]) + "\n"
+    return "\n".join([names, *with_gap_lines(map(",".join, zip(*written, strict=True)), gaps)]) + "\n"
 
 
 def plain_decimals(column: Array) -> list[str]:

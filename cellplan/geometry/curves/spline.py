@@ -41,8 +41,7 @@ def _open_rates(knots: Array, values: Array) -> Array:
 def _end_rate(knots: Array, values: Array) -> Array:
     """Derivative at the first knot of the polynomial through the first few values, shape (3,)."""
     x, y = knots[:END_POINT_COUNT] - knots[0], values[:END_POINT_COUNT] - values[0]
-    coefficients = np.linalg.solve(np.vander(x / x[-1], increasing=True), y)
-    return coefficients[1] / x[-1]
+    return np.linalg.solve(np.vander(x / x[-1], increasing=True), y)[1] / x[-1]
 
 
 def _periodic_rates(knots: Array, values: Array) -> Array:

@@ -209,8 +209,7 @@ def contains(mesh: Mesh, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bo
     A few open edges do no harm. Points on the surface itself may count either way.
     """
     surface = outer_surface(mesh)
-    inside = winding_numbers(surface.vertices[surface.faces], points) > 0.5
-    return np.asarray(inside, dtype=np.bool_)
+    return np.asarray(winding_numbers(surface.vertices[surface.faces], points) > 0.5, dtype=np.bool_)
 
 
 def _not_closed(mesh: Mesh) -> str:

@@ -116,8 +116,7 @@ def given_record(ready: PreparedSearch, program: TimedProgram | None = None) -> 
         elif searched.request.objective is Objective.CYCLE:
             cycle = program.cycle
     except (InputError, NoSolutionError) as error:
-        reason = str(error).splitlines()[0]
-        return {**NOT_SOLVED, "reason": reason}
+        return {**NOT_SOLVED, "reason": str(error).splitlines()[0]}
     rejected = rejection_of(program, searched.variables)
     if not rejected and standing is not None:
         rejected = too_singular(searched, standing, program)

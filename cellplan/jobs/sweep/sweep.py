@@ -124,8 +124,7 @@ def evaluate_variant(job: SweepJob, variant: Variant) -> TrialOutcome:
 @lru_cache(maxsize=1)
 def _base_cell(job: SweepJob) -> Cell:
     """The cell with what is set for all variants; read once in each process."""
-    cell = load_cell(job.cell, allow_dirs=job.allow_dirs)
-    return with_overrides(cell, job.settings)
+    return with_overrides(load_cell(job.cell, allow_dirs=job.allow_dirs), job.settings)
 
 
 def _require_a_valid_value(base: Cell, axis: Axis) -> None:

@@ -7,8 +7,7 @@ from cellplan.model.cell.cell import Cell
 
 def sequence_of(cell: Cell, robot: str) -> tuple[str, ...]:
     """Tasks and marks of a robot in their order: that of the cell's tasks when the robot states none."""
-    order = cell.robot(robot).order
-    return order or tuple(task.name for task in cell.tasks if task.robot == robot)
+    return cell.robot(robot).order or tuple(task.name for task in cell.tasks if task.robot == robot)
 
 
 def order_faults(

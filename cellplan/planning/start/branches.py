@@ -205,8 +205,7 @@ def _promising_configurations(search: StartSearch, holder: Robot) -> Array:
         goal = (X_WP if relation.relative_to is Frame.PART else np.eye(4)) @ search.X_PT_start(relation)
         base = operator.X_WB[:3, 3]
         awkwardness = np.maximum(awkwardness, _awkwardness(goal, usual, base))
-    order = best_first(np.column_stack([-awkwardness, q]))
-    return q[order[:HOLDER_POSTURES]]
+    return q[best_first(np.column_stack([-awkwardness, q]))[:HOLDER_POSTURES]]
 
 
 def _awkwardness(goal: Array, usual: Array, base: Array) -> Array:

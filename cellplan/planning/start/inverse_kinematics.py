@@ -91,8 +91,7 @@ def within_limits(model: RobotModel, q: Array) -> Array:
     """Turn joints by whole turns nearest to mid-range and drop configurations out of limits, shape (K, n)."""
     lower, upper = finite_limits(model)
     q = on_nearest_turns(model, q)
-    inside = q[np.all((q >= lower) & (q <= upper), axis=1)]
-    return _distinct(inside)
+    return _distinct(q[np.all((q >= lower) & (q <= upper), axis=1)])
 
 
 def on_nearest_turns(model: RobotModel, q: Array) -> Array:

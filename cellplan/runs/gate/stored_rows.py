@@ -38,8 +38,7 @@ class StoredRows:
 
     def of_phase(self, place: int) -> dict[str, JointTable]:
         """The rows of one phase on its own time, by robot."""
-        cut = self.clock.cut(list(self.tables.values()), place)
-        return dict(zip(self.tables, cut, strict=True))
+        return dict(zip(self.tables, self.clock.cut(list(self.tables.values()), place), strict=True))
 
     def refuse_other_starts(self, cell: Cell) -> None:
         """Refuse phases that do not begin at the start posture of the cell; idle robots are at their homes.

@@ -71,8 +71,7 @@ class DemandedProgram:
             return with_nominal_times(ProgramClock.from_cell(cell, self.plan), written, cell, file=file)
         steps = self._steps(written, file)
         schedules = [self._schedule(place, steps[place]) for place in range(len(self.plan.phases))]
-        clock = ProgramClock.of(cell, self.plan, schedules)
-        return with_nominal_times(clock, written, cell, file=file)
+        return with_nominal_times(ProgramClock.of(cell, self.plan, schedules), written, cell, file=file)
 
     def scenes(self, cell: Cell) -> list[Scene]:
         """The scene of each phase of the first cycle."""

@@ -85,8 +85,7 @@ def with_homes(cell: Cell, homes: Mapping[str, Array], *, given: Cell) -> Cell:
 
 def depends_on_homes(cell: Cell, runs: Sequence[PlannedRun]) -> bool:
     """Whether the motion of a run is another one when idle robots stand elsewhere: a goal keeps away from them."""
-    keeps_away = cell.solver.secondary.obstacles is not None
-    return keeps_away and any(homeless(cell, run.phase) for run in runs)
+    return (cell.solver.secondary.obstacles is not None) and any(homeless(cell, run.phase) for run in runs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

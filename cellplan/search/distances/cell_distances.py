@@ -115,8 +115,7 @@ class CellDistances:
         """
         cell = self.variables.placed(x)
         table, engine = self._placed(cell)
-        D = table.forest.displacements(q, _bases(cell))
-        return table.find(engine, D, within)
+        return table.find(engine, table.forest.displacements(q, _bases(cell)), within)
 
     def derivatives(self, near: NearPairs, x: Array, dq: Array) -> Array:
         """Derivatives of near distances by the variables, shape (M, n).

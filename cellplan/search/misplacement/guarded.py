@@ -106,8 +106,7 @@ class GuardedProblem(LayoutProblem):
         place = pair - len(self.bodies.pairs)
         if place < 0:
             return LayoutProblem.pair_names(self, pair)
-        relation = self.job.relations[arms(self.job)[self.guards[place]]]
-        return relation.robot, "a singular configuration"
+        return self.job.relations[arms(self.job)[self.guards[place]]].robot, "a singular configuration"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -171,8 +171,7 @@ class Variables:
 
     def read_from(self, cell: Cell) -> Array:
         """Values of the variables in another cell with the same robots, brought into the bounds, shape (n,)."""
-        numbers = State.given(cell).numbers(cell, self.tied.ranges)
-        return self.tied.values(numbers)
+        return self.tied.values(State.given(cell).numbers(cell, self.tied.ranges))
 
 
 def _varied(tied: Tied) -> dict[str, Any]:

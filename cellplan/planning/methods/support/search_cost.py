@@ -191,8 +191,7 @@ def _kind(task: Relation) -> str:
     """Which directions of the tool count: all, its axis, those about one axis, or none."""
     if task.is_spin_free:
         return "axis"
-    rotations = sum(axis >= 3 for axis in task.axes)
-    return {0: "none", 3: "all"}.get(rotations, "turn")
+    return {0: "none", 3: "all"}.get(sum(axis >= 3 for axis in task.axes), "turn")
 
 
 def _twist(E: Array, rotations: Sequence[int]) -> Array:
