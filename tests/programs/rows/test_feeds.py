@@ -42,7 +42,8 @@ def test_the_head_says_for_whom_the_feed_holds_and_who_is_slower() -> None:
     assert said(even, even, feeds=(FEED, FEED)) == [holds("alpha"), holds("beta")]
     assert said(even, slower, feeds=(FEED, 0.5 * FEED)) == [
         holds("alpha"),
-        "at the stated times the tool of 'beta' has its feed on 94% of its way in process, and goes down to 50%",  # 8 of 8.5 steps
+        # 8 of 8.5 steps
+        "at the stated times the tool of 'beta' has its feed on 94% of its way in process, and goes down to 50%",
     ]
     assert said(slower, slower, feeds=(None, None)) == []
 
