@@ -7,6 +7,13 @@ from pathlib import Path
 import pytest
 from builders.commands import run_command
 
+from cellplan import open_gate
+from cellplan.errors import LineRefusedError
+from cellplan.model.report.exported import Moves, Promise
+from cellplan.programs.dialects import DIALECTS
+from cellplan.programs.export.choice import Choice
+from cellplan.programs.export.prepare import prepare
+
 CELL = Path(__file__).resolve().parents[3] / "cells" / "in_turn.yaml"
 MOVES = {"krl": ("kuka.src", r"^(?:LIN|CIRC|PTP) "), "val3": ("staubli/rectangle.pgx", r"^  move[jlc]\(")}
 
@@ -98,8 +105,8 @@ OF_BOTH = {  # changes of the files of an arm and its positioner, each of them n
 
 
 @pytest.mark.slow
-def test_a_ring_is_welded_while_a_positioner_turns_the_block(tmp_path: Path) -> None:
-    """The table moves in the seam, whose points are few; programs of joints of the same run have no lines."""
+def test_a_ring_is_welded_while_a_positioner_turns_the_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table moves in the seam, whose points are few; where its lines are refused, the same run moves by joints."""
     shutil.copy(TABLE, tmp_path / "cell.yaml")
     assert run_command("cellplan solve cell.yaml -o run -q", tmp_path)[0] == 0
 
@@ -123,3 +130,13 @@ def test_a_ring_is_welded_while_a_positioner_turns_the_block(tmp_path: Path) -> 
             (tmp_path / "p" / name).write_bytes(text.replace(old, new, 1).encode())
             assert run_command(verify, tmp_path)[0] != 0
         (tmp_path / "p" / name).write_bytes(text.encode())
+
+    def refused(*_: object) -> None:
+        raise LineRefusedError("ring", ", 3 mm along its seam: it cannot")
+
+    monkeypatch.setattr("cellplan.programs.export.prepare.executed_programs", refused)
+    run = open_gate(tmp_path / "run", cell=tmp_path / "cell.yaml")
+    by_joints = prepare(run, DIALECTS["krl"], Choice(moves=Moves.AUTO))
+    assert by_joints.promised.promise is Promise.SYNCHRONISED
+    assert by_joints.promised.reasons[-1] == "no lines: task 'ring': 3 mm along its seam: it cannot"
+    assert not re.search("LIN|CIRC|EK", DIALECTS["krl"].render(by_joints.job)["arm.src"])
