@@ -137,8 +137,10 @@ def test_every_key_is_a_name_or_bound() -> None:
     of_controller, of_robot = set(ControllerEntry.model_fields), set(RobotControlEntry.model_fields)
     last = {address.split(".")[2 if address.startswith("controllers") else 3] for address in [*NAMES, *BOUND]}
 
-    assert last | {"task", "id"} == of_controller | of_robot  # a task is renamed together with those of its controller
-    assert {"tasks", "process"} == ControllerEntry.NAMES
+    elsewhere = {"task", "id"}  # a task is renamed together with those of its controller
+    other_kinds = {"machine", "position_levels_mm"}  # names, as the last two lines say
+    assert last | elsewhere | other_kinds == of_controller | of_robot
+    assert {"tasks", "process", "position_levels_mm"} == ControllerEntry.NAMES
     assert of_robot - RobotControlEntry.NAMES == {"id", "cycle_ms", "base", "tool_frame"}
 
 
