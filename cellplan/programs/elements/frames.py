@@ -22,4 +22,8 @@ def require_rest(robot: str, station: Station) -> None:
     """Refuse lines in a frame that moves: that of a part which moves while the tool of a robot works on it."""
     if station.X is None or station.holder is not None:
         tasks = ", ".join(station.tasks)
-        raise InputError(f"robots.{robot}: expected a part that rests for lines of the tool (tasks {tasks})")
+        carried = "one that moves" if station.holder is None else f"'{station.holder}' of the same controller"
+        raise InputError(
+            f"robots.{robot}: expected a part that rests, held by a robot of another controller, for lines of the tool "
+            f"(tasks {tasks}), got {carried}; write joints (--moves joints)"
+        )

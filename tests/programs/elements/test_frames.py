@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,11 +10,12 @@ from builders.export_jobs import cell_of, controlled, job_of, random_program
 from builders.rapid_jobs import multimove_job, part_job
 from builders.scene_builders import arm_model
 
-from cellplan.errors import InputError
-from cellplan.geometry.transforms import pose
+from cellplan.errors import InputError, refusals
+from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell.cell import Tool
-from cellplan.model.report.exported import ExportJob
+from cellplan.model.report.exported import ExportJob, Station
 from cellplan.model.settings.entry import PoseEntry
+from cellplan.programs.elements.frames import require_rest
 from cellplan.programs.formats.rapid.writer import RAPID
 from cellplan.programs.formats.val3.writer import VAL3
 from cellplan.programs.rows.part_targets import with_part_poses
@@ -65,3 +67,19 @@ def test_tools_of_val3_are_given_in_the_flange_of_the_controller() -> None:
 
     tool = re.search(r'x="20.000" y="-100.000" z="250.000" rx="([-\d.]+)" ry="([-\d.]+)" rz="([-\d.]+)"', text)
     assert [float(number) for number in tool.groups()] == [90.0, 0.0, -90.0]  # Rz(-90) Ry(90) = Rx(90) Rz(-90)
+
+
+@pytest.mark.parametrize(
+    ("X", "holder", "carried"), [(None, None, "one that moves"), (np.eye(4), "table", "'table' of the same controller")]
+)
+def test_lines_in_a_frame_that_moves_are_refused_with_who_carries_it(
+    X: Array | None, holder: str | None, carried: str
+) -> None:
+    with pytest.raises(InputError, match=rf"robots\.arm: .*\(tasks a, b\), got {carried}; write joints"):
+        require_rest("arm", Station(tasks=("a", "b"), X=X, holder=holder))
+
+
+def test_lines_in_a_frame_at_rest_are_taken() -> None:
+    at_rest = Station(tasks=("a",), X=np.eye(4), holder=None)
+
+    assert not list(refusals(partial(require_rest, "arm", at_rest)))
