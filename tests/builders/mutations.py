@@ -23,27 +23,25 @@ class Language(NamedTuple):
 
     remark: str  # rows that stay as they are: comments, dates, and heads of files
     acts: str  # rows of which two in another order, or one twice, do something else
-    free: str  # what nothing is promised of, as kind, row, and what stands before the change: speeds of transfers
+    free: str = r"^$"  # what nothing is promised of, as kind, row, and what stands before the change
 
 
 SPEED_DATA = r"CONST speeddata \w+ := \[.*|tooldata .*\],\[.*"  # of joints and turns; the mass is not stated
 LANGUAGES = {
-    "rapid": Language(
-        remark=r"!|<|MODULE|ENDMODULE", acts=r"(?:Move|Arc|SetDO|WaitDI|seam;)", free=rf"\\T:=$|{SPEED_DATA}$"
-    ),
-    "krl": Language(remark=r";|&", acts=r"(?:PTP|LIN|CIRC|\$OUT|WAIT|ARC_|seam\(\))", free=r"VEL_PTP,$|ADVANCE=$"),
+    "rapid": Language(remark=r"!|<|MODULE|ENDMODULE", acts=r"(?:Move|Arc|SetDO|WaitDI|seam;)", free=rf"{SPEED_DATA}$"),
+    "krl": Language(remark=r";|&", acts=r"(?:PTP|LIN|CIRC|\$OUT|WAIT|ARC_|seam\(\))", free=r"ADVANCE=$"),
     "fanuc_ls": Language(
         remark=r"\d+:  !|[A-Z_: ]+ =|/|[A-Z_]+ = \d+,",
         acts=r"\d+:(?!  U)",
-        free=r"^whole number \|.*\| +$|J P\[\d+\] $",
+        free=r"^whole number \|.*\| +$",
     ),
-    "inform": Language(remark=r"'|///(?:DATE|COMM)", acts=r"(?:MOV|WAIT|DOUT|ARC|WV|CALL)", free=r"VJ=$"),
+    "inform": Language(remark=r"'|///(?:DATE|COMM)", acts=r"(?:MOV|WAIT|DOUT|ARC|WV|CALL)"),
     "val3": Language(
         remark=r"<!--|//|<\?|<Programs|<Project|<Database xml|<Parameters|<Libraries|<Types",
         acts=r"(?:move|wait|do\w+=|call|delay)",
-        free=r'^row twice \| waitEndMove|vel="$|movej\(.*mMove\[$',
+        free=r"^row twice \| waitEndMove",
     ),
-    "urscript": Language(remark=r"#", acts=r"(?:move|set_\w*digital|sleep|while|seam\(\))", free=r"movej\(.* v=$"),
+    "urscript": Language(remark=r"#", acts=r"(?:move|set_\w*digital|sleep|while|seam\(\))"),
 }
 
 

@@ -101,6 +101,9 @@ class RobotRows:
     middles: NDArray[np.bool_] | None = None
     # time in [s] of the motion to each row as a file of single motions states it, shape (N,); NaN where it states none
     durations: Array | None = None
+    # speed of the joints on the way to each row as a file states it, shape (N,), see ``Dialect.speeds``; NaN where it
+    # states none
+    speeds: Array | None = None
     # how far the robot may be from the even motion of its joints in each step, shape (N - 1, 4 + n): the tool on the
     # part and its tip in the world, in [m] and [rad] each, then the joints; None for a target that moves them evenly
     tube: Array | None = None

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ExportFrame, ExportJob, Interpolation, Moves, ProgramRows, Promise
+from cellplan.model.report.exported import ExportFrame, ExportJob, Interpolation, Moves, ProgramRows, Promise, RobotRows
 from cellplan.model.settings.controllers import KindName
 
 SHARES: Final = (0.5, 0.35, 0.25, 0.15, 0.1, 0.05, 0.0)  # [-] of a segment, the largest first
@@ -58,6 +58,8 @@ class Dialect:
     # configuration of arms as its targets state it, for joints in [rad] or [m], shape (N, n) to (N, k); an
     # ``InputError`` for an arm that has none. None where targets state none.
     configuration: Callable[[Robot, Array], NDArray[np.int_]] | None = None
+    # speed of joints on the way to each row of a robot as files state it, shape (N,); None where they state none
+    speeds: Callable[[Robot, RobotRows], Array] | None = None
     # what its programs need of the cell, as calls that raise ``InputError`` where it is not there; all of them are made
     # before anything is computed
     demands: Demands = no_demands

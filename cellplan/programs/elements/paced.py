@@ -266,6 +266,7 @@ class ReadMove:
     share: float = 0.0
     process: Which | None = None
     duration: float = np.nan
+    speed: float = np.nan  # of the joints, as ``RobotRows.speeds``
 
 
 def rows_of_moves(
@@ -292,7 +293,7 @@ class _RowsOfMoves:
         self._events = events
         self._rows: list[tuple[Array, Array, Sequence[int] | None, float, bool]] = []  # q, pose, configuration, feed
         self._zones: list[tuple[float, float]] = []
-        self._durations: list[float] = []
+        self._stated: list[tuple[float, float]] = []  # duration, speed
         self._process: list[bool] = []
         self._marks: list[int] = []
         self._seams: list[Seam] = []
@@ -333,7 +334,7 @@ class _RowsOfMoves:
             self._rows.append((move.q, pose, stated, move.feed, place < len(move.poses) - 1))
         count = len(self._rows) - first
         self._zones += [(0.0, 0.0)] * (count - 1) + [(move.zone, move.share)]
-        self._durations += [move.duration] * count
+        self._stated += [(move.duration, move.speed)] * count
         self._process += [is_on] * count
         if not move.poses:
             return
@@ -354,6 +355,7 @@ class _RowsOfMoves:
         q, poses, configurations, feeds, middles = (list(column) for column in zip(*self._rows, strict=True))
         X_PT, is_middle = np.array(poses), np.array(middles)
         zones, shares = (np.array(column) for column in zip(*self._zones, strict=True))
+        durations, speeds = (column if np.any(column >= 0.0) else None for column in np.array(self._stated).T)
         lengths = shorter_lengths(X_PT[:, :3, 3])
         rounding = np.where(zones > 0.0, np.minimum(zones / np.maximum(lengths, NO_SHAPE), 1.0), shares)
         stated = next((len(entry) for entry in configurations if entry is not None), 0)
@@ -369,7 +371,8 @@ class _RowsOfMoves:
             seams=tuple(self._seams),
             feeds=np.array(feeds) if self._seams else None,
             middles=is_middle if self._seams else None,
-            durations=None if np.all(np.isnan(self._durations)) else np.array(self._durations),
+            durations=durations,
+            speeds=speeds,
         )
 
 

@@ -177,7 +177,7 @@ def paged(job: ExportJob, dialect: Dialect, program: ProgramRows, robot: str, pa
         rows=rows,
         numbers=numbers,
         decimals=decimals,
-        speeds=_percentages(placed, rows),
+        speeds=percentages(placed, rows).astype(int).tolist(),
         shares=shares_as_written(row_shares(job, program)[robot], numbers, pages),
         first=first_steps(job.frame, robot) if steps else [],
         steps=steps,
@@ -225,19 +225,19 @@ def read_programs(
     return tuple(ProgramRows(name=program, robots=robots) for program, robots in programs.items())
 
 
-def _percentages(robot: Robot, rows: RobotRows) -> list[int]:
-    """Speed with which a robot comes to each row, as a whole share of the top speed of its axes in [%], 1 to 100.
+def percentages(robot: Robot, rows: RobotRows) -> Array:
+    """Speed with which a robot comes to each row, as a whole share of the top speed of its axes in [%], shape (N,).
 
     It is that of the plan: the largest share that an axis needs from one row to the next in the time between them. A
     stretch in which nothing moves keeps the share before it.
     """
     if rows.times is None or len(rows) < 2:
-        return [SLOW] * len(rows)
+        return np.full(len(rows), float(SLOW))
     top = np.array([joint.top_speed for joint in robot.model.joints])
     shares = np.max(
         np.abs(np.diff(rows.q, axis=0)) / (np.maximum(np.diff(rows.times), SHORTEST)[:, None] * top), axis=1
     )
-    percentages = [SLOW]
+    stated = [float(SLOW)]
     for share in np.clip(np.rint(100.0 * shares), 1, 100) * (shares > 0.0):
-        percentages.append(int(share) or percentages[-1])
-    return percentages
+        stated.append(float(share) or stated[-1])
+    return np.array(stated)

@@ -20,7 +20,7 @@ TIME_ROUNDING: Final = 0.5e-3  # [s] formats write times with three decimals or 
 ROUNDING_TOL: Final = 1e-9  # [rad] or [m] arithmetic of units and zeros
 QUANTA: Final = 2.01  # [-] of the last decimal of a degree or millimetre: two axes that are coupled round by one each
 SHARE_TOL: Final = 0.02  # [-] zones are sizes, of segments between rows that are rounded; what is read is judged
-FEED_TOL: Final = 1e-6  # [m/s] three decimals of a millimetre per second
+FEED_TOL: Final = 1e-6  # [m/s], or as joint speeds are stated: three decimals at most
 SEAM_PLACE: Final = 1e-5  # [mm] languages of radians state places in metres
 SEAM_TURN: Final = 2e-3  # [deg] three angles with three decimals, each off by half of the last one, turn by half of it
 SOLVED_TOL: Final = 1e-4  # [rad] or [m] positions that are worked out again from poses of tools
@@ -42,6 +42,7 @@ def other_rows(dialect: Dialect, job: ExportJob, read: tuple[ProgramRows, ...]) 
         for name, rows in written.robots.items():
             finding = _other(dialect, job, rows, recovered.robots[name])
             finding = finding or _other_rounding(rows, recovered.robots[name], shares[name])
+            finding = finding or _other_speed(dialect, job, written, recovered.robots[name])
             if finding is not None:
                 yield f"{where}robot '{name}': {finding}"
 
@@ -135,6 +136,19 @@ def _other_time(written: RobotRows, read: RobotRows) -> str | None:
         return None
     row = int(np.argmax(late))
     return f"row {row + 1}: expected the time {written.times[row]:.6g} s, read {read.times[row]:.6g} s"
+
+
+def _other_speed(dialect: Dialect, job: ExportJob, written: ProgramRows, read: RobotRows) -> str | None:
+    """The first row to which the joints do not move as fast as written; in step all robots move as the fastest one."""
+    if dialect.speeds is None or read.speeds is None:
+        return None
+    names = [read.robot] if job.frame.promise.waits else job.frame.robots
+    expected = np.max([dialect.speeds(job.frame.robot(name), written.robots[name]) for name in names], axis=0)
+    off = np.abs(read.speeds - expected) > FEED_TOL
+    if not np.any(off):
+        return None
+    row = int(np.argmax(off))
+    return f"row {row + 1}: expected a speed of the joints of {expected[row]:.6g}, read {read.speeds[row]:.6g}"
 
 
 def _other_position(dialect: Dialect, job: ExportJob, written: RobotRows, read: RobotRows) -> str | None:

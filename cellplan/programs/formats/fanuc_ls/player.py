@@ -23,6 +23,7 @@ class TpMotion:
     statement: Statement
     points: tuple[TpPoint, ...] = ()  # its point, and before it that through which an arc leads
     duration: float = 0.0  # [ms]; 0 where none is stated
+    speed: float = math.nan  # of a motion of joints in [%]; NaN where none is stated
     feed: float | None = None  # of the tool in [m/s], NaN for that of the weld data; None for a motion of joints
     region: float = 0.0  # of its corner in [mm]
     is_passed: bool = False  # whether a motion of joints ends in CNT
@@ -184,8 +185,8 @@ def _motion(statement: Statement, *, is_timed: bool) -> tuple[list[tuple[int, st
         raise statement.error(f"1 to {MOST_MS} ms" if is_timed else "a whole speed of 1 to 100 %", f"{speed}{unit}")
     if ending != "FINE" and int(str(ending).removeprefix("CNT")) > 100:
         raise statement.error("FINE, or CNT0 to CNT100", ending)
-    duration, is_passed = value if is_timed else 0.0, ending != "FINE"
-    return _names([point]), TpMotion(statement=statement, duration=duration, is_passed=is_passed, suffix=suffix or "")
+    motion = TpMotion(statement=statement, is_passed=ending != "FINE", suffix=suffix or "")
+    return _names([point]), replace(motion, duration=value) if is_timed else replace(motion, speed=value)
 
 
 def _names(points: Sequence[str | None]) -> list[tuple[int, str]]:

@@ -68,6 +68,7 @@ def _in_step(player: TpPlayer, group: MotionGroup) -> RobotRows:
         q=np.array([_joints(group, motion) for motion in motions]),
         times=np.cumsum([motion.duration for motion in motions]) / MILLISECONDS["sec"],
         rounding=np.where([motion.is_passed for motion in motions], LARGEST_SHARE, 0.0),
+        speeds=np.array([motion.speed for motion in motions]),
     )
 
 
@@ -119,6 +120,7 @@ def _read_move(events: Events, group: MotionGroup, motion: TpMotion, *, in_proce
         zone=motion.region / MM,
         share=LARGEST_SHARE if motion.is_passed else 0.0,
         process=_process(events, motion),
+        speed=motion.speed,
     )
 
 

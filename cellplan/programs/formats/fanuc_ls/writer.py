@@ -14,7 +14,7 @@ from cellplan.programs.elements.corners import LARGEST_SHARE, row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.paced import moves_of
-from cellplan.programs.elements.pages import SLOW, PagedProgram, paged, pages_of, robots_of
+from cellplan.programs.elements.pages import SLOW, PagedProgram, paged, pages_of, percentages, robots_of
 from cellplan.programs.elements.text import comment
 from cellplan.programs.elements.timed_rows import shared_clock
 from cellplan.programs.formats.fanuc_ls.groups import KIND, TpProgram, demands, seam_name, tp_programs
@@ -137,5 +137,6 @@ FANUC_LS: Final[Dialect] = Dialect(
     split=PAGE,
     moves=tuple(Moves),
     configuration=configuration,
+    speeds=percentages,
     demands=demands,
 )

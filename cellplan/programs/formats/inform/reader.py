@@ -99,6 +99,7 @@ class _RobotReader:
             feed=np.nan if is_joint else float(str(statement.words[1])) / MM,
             zone=0.0 if is_joint else self._zone(motion),
             share=LARGEST_SHARE if motion.level and (is_joint or not len(self._radii)) else 0.0,
+            speed=float(str(statement.words[1])) if is_joint else np.nan,
         )
 
     def _zone(self, motion: Motion) -> float:

@@ -19,7 +19,7 @@ from cellplan.programs.elements.conventions import convention_of
 from cellplan.programs.elements.corners import LARGEST_SHARE
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.paced import NO_SHAPE, Events, Move, blocks, moves_of, shorter_lengths
-from cellplan.programs.elements.pages import PagedProgram, paged, robots_of
+from cellplan.programs.elements.pages import PagedProgram, paged, percentages, robots_of
 from cellplan.programs.elements.text import ascii_text, comment, fixed, joined
 from cellplan.programs.formats.inform.jobs import (
     KIND,
@@ -223,4 +223,5 @@ INFORM: Final = Dialect(
     demands=demands,
     moves=tuple(Moves),
     configuration=configuration,
+    speeds=percentages,
 )

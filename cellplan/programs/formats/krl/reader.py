@@ -43,6 +43,7 @@ def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> It
             q=from_numbers(frame.robot(name), written),
             marks=tuple(player.marks),
             rounding=np.array(player.rounding) / WHOLE,
+            speeds=np.array(player.speeds),
         )
 
 
@@ -91,7 +92,8 @@ class _KrlPlayer:
     marks: list[int] = field(default_factory=list)  # rows with a handshake
     calls: int = 0  # number of pages that were called
     settings: set[str] = field(default_factory=set)  # what was set before the first motion
-    speed: bool = False  # whether a speed was set
+    speed: float = 0.0  # of the joints from here on in [%]; 0 before it is set
+    speeds: list[float] = field(default_factory=list)  # of each row
     rounded: bool = False  # whether the last row is rounded
     rounding: list[int] = field(default_factory=list)  # how far each row is, in [%]; 0 for a stop
     share: int = 0  # how far rows are from here on, in [%]; 0 before it is set
@@ -108,9 +110,9 @@ class _KrlPlayer:
         elif statement.kind == "PTP":
             self._move(module, statement)
         elif statement.kind == "VEL_PTP":
-            if not 0.0 < float(statement.words[0] or 0) <= 100.0:
+            self.speed = float(statement.words[0] or 0)
+            if not 0.0 < self.speed <= 100.0:
                 raise statement.error("a speed above 0 and up to 100")
-            self.speed = True
         elif statement.kind == "APO":
             self.share = _share(statement)
         else:
@@ -194,6 +196,7 @@ class _KrlPlayer:
             raise statement.error("$APO.CPTP to be set before C_PTP")
         self.names.pop()
         self.rounding.append(self.share if self.rounded else 0)
+        self.speeds.append(self.speed)
         self.rows.append(self._values(module, name))
 
     def _values(self, module: KrlModule, name: str) -> Sequence[float]:

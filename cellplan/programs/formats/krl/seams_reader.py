@@ -262,7 +262,8 @@ class _Player:
         if is_rounded and "CPTP" not in self.settings:
             raise statement.error("$APO.CPTP to be set before C_PTP")
         share = self.settings["CPTP"] / WHOLE if is_rounded else 0.0
-        return ReadMove(refuse=statement.refuse, task=self.task, q=from_numbers(placed, written)[0], share=share)
+        q, speed = from_numbers(placed, written)[0], self.settings["VEL_PTP"]
+        return ReadMove(refuse=statement.refuse, task=self.task, q=q, share=share, speed=speed)
 
     def _tool_move(self, statement: Statement) -> ReadMove:
         """A line or an arc of the tool."""

@@ -18,6 +18,7 @@ from cellplan.programs.elements.paced import moves_of
 from cellplan.programs.elements.pages import (
     PagedProgram,
     paged,
+    percentages,
     program_paths,
     render_programs,
     shares_as_written,
@@ -176,6 +177,7 @@ KRL: Final[Dialect] = Dialect(
     promises=(Promise.SYNCHRONISED, Promise.PACED, Promise.SEQUENCE_ONLY),
     moves=tuple(Moves),
     configuration=status_and_turn,
+    speeds=percentages,
     most_arms=1,
     has_seams_in_step=True,
     kinds=frozenset({"kuka"}),

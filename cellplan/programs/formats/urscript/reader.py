@@ -12,7 +12,7 @@ from cellplan.model.report.exported import ExportFrame, ProgramRows, Promise, Ro
 from cellplan.programs.elements.joints import ARM, Angle, from_numbers
 from cellplan.programs.elements.text import line_error, mismatch_error
 from cellplan.programs.elements.timed_rows import cycle_of, file_path, require_paths
-from cellplan.programs.formats.urscript.rows import move_acceleration
+from cellplan.programs.formats.urscript.rows import APPROACH_SPEED, move_acceleration
 from cellplan.programs.formats.urscript.seams_reader import SeamReader
 from cellplan.programs.formats.urscript.statements import Statements, UrscriptStatement, compact
 from cellplan.programs.formats.urscript.text import (
@@ -122,6 +122,7 @@ def _approach(points: _Points, statements: Statements) -> None:
 def _sequence(frame: ExportFrame, robot: Robot, statements: Statements) -> RobotRows:
     """Rows and marks of a program that moves from row to row."""
     points, marks, radii = _Points(frame, robot, statements.file), list[int](), [0.0]
+    speeds = [APPROACH_SPEED]
     acceleration = re.escape(f"{move_acceleration(robot):.3f}")
     move = re.compile(rf"movej\({points.pattern},a={acceleration},v=({_SPEED})(?:,r=({_RADIUS}))?\)")
     first = statements.peek()
@@ -136,6 +137,7 @@ def _sequence(frame: ExportFrame, robot: Robot, statements: Statements) -> Robot
             _require_speed(robot, float(match[2]), statement, statements.file)
             is_blended, at = match[3] is not None, statement
             radii.append(float(match[3] or 0.0))
+            speeds.append(float(match[2]))
             continue
         if is_blended or not is_met:
             raise line_error(statements.file, statement.line, "movej, or end", statement.shown)
@@ -146,7 +148,7 @@ def _sequence(frame: ExportFrame, robot: Robot, statements: Statements) -> Robot
     if is_met and not marks:
         raise mismatch_error(statements.file, first.line, "a handshake at a row, as its output is lowered", "none")
     rows = points.rows(times=False, marks=tuple(marks))
-    return replace(rows, rounding=tool_shares(robot, rows.q, np.array(radii)))
+    return replace(rows, rounding=tool_shares(robot, rows.q, np.array(radii)), speeds=np.array(speeds))
 
 
 def _require_speed(robot: Robot, speed: float, statement: UrscriptStatement, file: str) -> None:

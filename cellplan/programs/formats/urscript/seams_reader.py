@@ -146,7 +146,8 @@ class SeamReader:
             raise self._error(statement, f"a speed above 0 and up to {largest:.3f} rad/s")
         if self._moves and words[2] != f"{move_acceleration(self._robot):.3f}":
             raise self._error(statement, f"a={move_acceleration(self._robot):.3f}")
-        return ReadMove(refuse=self._refusal(statement), task=task, q=self._point(statement, words[1], self._joints))
+        q = self._point(statement, words[1], self._joints)
+        return ReadMove(refuse=self._refusal(statement), task=task, q=q, speed=float(words[3]))
 
     def _tool_move(self, statement: UrscriptStatement, words: re.Match[str], task: str | None) -> ReadMove:
         """A line or an arc of the tool."""

@@ -150,5 +150,6 @@ URSCRIPT: Final[Dialect] = Dialect(
     is_rounded=True,
     lags=True,
     split=MOST_ROWS,
+    speeds=move_speeds,
     demands=_demands,
 )

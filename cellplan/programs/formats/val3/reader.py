@@ -40,7 +40,7 @@ def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> tu
     placed = frame.robot(robot)
     q = from_numbers(placed, np.array(player.rows, dtype=np.float64).reshape(-1, 6))
     rounding = tool_shares(placed, q, np.array(player.zones) / MM)
-    return (RobotRows(robot=robot, q=q, marks=tuple(player.marks), rounding=rounding),)
+    return (RobotRows(robot=robot, q=q, marks=tuple(player.marks), rounding=rounding, speeds=np.array(player.speeds)),)
 
 
 class _Val3Program(NamedTuple):
@@ -158,6 +158,7 @@ class _Val3Player:
     project: ReadProject
     rows: list[Sequence[float]] = field(default_factory=list)  # joint positions of the controller in each row
     zones: list[float] = field(default_factory=list)  # of the tool in [mm], by row; 0 for a stop
+    speeds: list[float] = field(default_factory=list)  # of the joints in [%], by row
     marks: list[int] = field(default_factory=list)  # rows with a handshake
     calls: list[str] = field(default_factory=list)  # programs that were called
     used: dict[str, int] = field(default_factory=dict)  # number of values that were moved to, by the name of their data
@@ -254,6 +255,7 @@ class _Val3Player:
         if not self.is_exact and (descriptor["blend"] != "joint" or not zone > 0.0):
             raise node.error("a blend of joints with leave or reach, or off")
         self.zones.append(0.0 if self.is_exact else zone)
+        self.speeds.append(float(descriptor.get("vel", "100")))
         self.stands = False
 
     def _value(self, node: Statement, counters: Mapping[str, int], place: int, kind: str) -> Mapping[str, str]:

@@ -157,7 +157,8 @@ class _SeamPlayer:
             raise statement.error(f"a motion descriptor with {' '.join(f'{it}={text}' for it, text in usual.items())}")
         if is_joint:
             numbers = np.array([[float(values[0].get(f"j{axis}", "0")) for axis in range(1, 7)]])
-            return ReadMove(refuse=statement.refuse, task=task, q=from_numbers(self._robot, numbers)[0])
+            q, speed = from_numbers(self._robot, numbers)[0], float(descriptor.get("vel", "100"))
+            return ReadMove(refuse=statement.refuse, task=task, q=q, speed=speed)
         if task is None or any(value["fatherId"] != part_of(self._frame, self._robot.name, task) for value in values):
             raise statement.error("points of a task in its frame of the part, in its program")
         return ReadMove(

@@ -10,7 +10,14 @@ from cellplan.model.units import MM
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.joints import from_numbers
 from cellplan.programs.elements.paced import moves_of
-from cellplan.programs.elements.pages import PagedProgram, paged, program_paths, render_programs, require_six_axes
+from cellplan.programs.elements.pages import (
+    PagedProgram,
+    paged,
+    percentages,
+    program_paths,
+    render_programs,
+    require_six_axes,
+)
 from cellplan.programs.elements.text import comment, fixed
 from cellplan.programs.formats.val3.names import (
     BASE,
@@ -189,5 +196,6 @@ VAL3: Final[Dialect] = Dialect(
     is_thinned=True,
     is_rounded=True,
     split=PAGE,
+    speeds=percentages,
     demands=_demands,
 )
