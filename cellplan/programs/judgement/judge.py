@@ -84,8 +84,7 @@ def judge(
         executed = executed_programs(job, dialect, full_rows(run), read)
     with without_cache():
         shared, deviations, corners = shared or Shared(run), list[Deviation](), list[Deviation]()
-        programs = list(played_programs(run, dialect, job, executed, lead=lead))
-        for played in programs:
+        for played in played_programs(run, dialect, job, executed, lead=lead):
             new_findings, new_deviations, new_corners = _judged_once(played, shared, dialect, job)
             findings += new_findings
             deviations += new_deviations
@@ -95,7 +94,7 @@ def judge(
         deviations=_largest(deviations),
         not_judged=tuple(_not_judged(dialect, job, read)),
         corners=_largest(corners),
-        rounded=_rounded(programs),
+        rounded=_rounded(job, read),
         executed=executed,
     )
 
@@ -227,7 +226,8 @@ def _deviations(played: ExecutedProgram, scenes: Sequence[Scene], *, of_joints: 
 
 def _corners(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[Deviation]:
     """By how much rounded rows may put the tools off, beside what they are off already."""
-    if not any(np.any(shares > 0.0) for shares in played.shares.values()):
+    has_tubes = any(rows.tube is not None for rows in played.rows.values())
+    if not has_tubes and not any(np.any(shares > 0.0) for shares in played.shares.values()):
         return
     for stretch, scene in _judged(played, scenes):
         rows = path_rows(played, stretch, scene)
@@ -245,9 +245,13 @@ def _corners(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[Devia
                 )
 
 
-def _rounded(programs: Sequence[ExecutedProgram]) -> tuple[int, int]:
+def _rounded(job: ExportJob, read: Sequence[ProgramRows]) -> tuple[int, int]:
     """Rows that are rounded, and all rows, of the robots that are exported."""
-    shares = [played.shares[name] for played in programs for name in played.exported]
+    shares = [
+        row_shares(job, written)[name] if rows.rounding is None else rows.rounding
+        for written, program in zip(job.programs, read, strict=True)
+        for name, rows in program.robots.items()
+    ]
     return sum(int(np.count_nonzero(share)) for share in shares), sum(map(len, shares))
 
 

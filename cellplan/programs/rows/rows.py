@@ -1,6 +1,6 @@
 """Rows of a verified run as an exported program starts from them: positions, times, speeds and process."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +31,7 @@ class WorkRows(NamedTuple):
     rows: slice  # the rows, both ends included
     cell: Cell  # the cell as it is in the phase
     tasks: tuple[str, ...]  # names of the tasks that are worked on
+    corners: Mapping[str, tuple[int, ...]]  # by task, the rows nearest to where its tool stops between the ends
 
 
 class EssentialRows(NamedTuple):
@@ -85,9 +86,20 @@ def _programs(run: VerifiedRun) -> Iterator[NominalRows]:
 
 def _work(run: VerifiedRun, piece: Piece) -> Iterator[WorkRows]:
     """The phases of a program, those of all cycles."""
+    sigma = run.motion.sigma[piece.rows]
     for place, _, rows in piece.phases:
         motion = run.motions[place % len(run.motions)]
-        yield WorkRows(rows, motion.cell, tuple(scheduled.task.name for scheduled in motion.schedule.tasks))
+        tasks = tuple(scheduled.task.name for scheduled in motion.schedule.tasks)
+        stops = {task: np.array(run.motion.plan.stops.get(task, ())) for task in tasks}
+        corners = {task: _corner_rows(sigma, rows, times) for task, times in stops.items()}
+        yield WorkRows(rows, motion.cell, tasks, corners)
+
+
+def _corner_rows(sigma: Array, rows: slice, stops: Array) -> tuple[int, ...]:
+    """Rows of a phase that are nearest to the inner ones of the nominal times at which a tool stops in it."""
+    there = sigma[rows]
+    inside = stops[(stops >= there[0]) & (stops <= there[-1])]
+    return tuple(rows.start + int(np.argmin(np.abs(there - time))) for time in inside[1:-1])
 
 
 def _robot_rows(cell: Cell, plan: Plan, nominal: NominalRows, *, robot: str) -> RobotRows:

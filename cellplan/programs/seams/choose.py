@@ -190,10 +190,10 @@ class _SeamRows:
     middles: set[int] = field(default_factory=set)  # intermediate points of arcs
     seams: list[tuple[str, int, int]] = field(default_factory=list)  # task, first and last row
 
-    def follow(self, path: ToolPath, first: int, last: int) -> None:
-        """Follow the tool on lines and arcs from one row to another."""
+    def follow(self, path: ToolPath, first: int, last: int, *, corners: Sequence[int]) -> None:
+        """Follow the tool on lines and arcs from one row to another, with ends at the corners of its path."""
         self.chosen -= set(range(first + 1, last))
-        pieces = list(path.pieces(_piece_ends(path, self.rows, first, last)))
+        pieces = list(path.pieces(_piece_ends(path, self.rows, (first, last), corners)))
         ends = [0, *(piece.last for piece in pieces)]
         for begin, piece in zip(ends, pieces, strict=False):
             feed = _feed(path, self.rows, (first, begin, piece.last))
@@ -276,7 +276,8 @@ def _seams_of(
         elif task is not None and task.name in by_joints:
             state.switch_off(first, last)
         elif task is not None:
-            state.follow(_path(scene, every, task, phase, most, in_step=in_step), first, last)
+            path = _path(scene, every, task, phase, most, in_step=in_step)
+            state.follow(path, first, last, corners=phase.corners[task.name])
     return state.assembled()
 
 
@@ -304,14 +305,14 @@ def _shorter(q: Array, places: Sequence[int]) -> dict[int, float]:
     return dict(zip(places[1:-1], np.minimum(lengths[:-1], lengths[1:]).tolist(), strict=True))
 
 
-def _piece_ends(path: ToolPath, rows: RobotRows, first: int, last: int) -> list[int]:
+def _piece_ends(path: ToolPath, rows: RobotRows, both: tuple[int, int], corners: Sequence[int]) -> list[int]:
     """Rows of a phase at which lines and arcs end, counted from its first: waits, switches of the process, corners."""
+    first, last = both
     inside = range(first + 1, last)
     needed = {first, last, *(row for row in rows.marks if row in inside)}
     needed |= set((first + np.flatnonzero(switches(rows)[first : last + 1])).tolist())
-    corners = [row for row in rows.stops if row in inside and row not in needed]
     ends = sorted(needed)
-    for row in corners:
+    for row in sorted({row for row in (*rows.stops, *corners) if row in inside} - needed):
         before, after = max(r for r in ends if r < row), min(r for r in ends if r > row)
         if not path.stands(before - first, row - first) and not path.stands(row - first, after - first):
             ends = sorted([*ends, row])

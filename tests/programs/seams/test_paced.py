@@ -1,7 +1,6 @@
 """Paced programs of a solved cell: what is written is read by other means, and what is changed is noticed."""
 
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.elements.frames import controller_base
 from cellplan.programs.export.choice import Choice
 from cellplan.programs.export.prepare import PreparedExport, prepare
-from cellplan.programs.export.written import judged
+from cellplan.programs.export.written import judged, write
 from cellplan.programs.formats.rapid.writer import RAPID
 from cellplan.programs.judgement.compare_rows import other_rows
 from cellplan.programs.rows.rows import full_rows
@@ -32,7 +31,8 @@ NUMBERS = r"\[([^\[\]]*)\]"
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> VerifiedRun:
     folder = tmp_path_factory.mktemp("paced")
-    shutil.copy(BEAD, folder / "cell.yaml")
+    off_grid = BEAD.read_text(encoding="utf-8").replace("[200, ", "[201.03, ")  # no row falls on the corner
+    (folder / "cell.yaml").write_text(off_grid, encoding="utf-8")
     status, _, error = run_command("cellplan solve cell.yaml -o run --quiet", folder)
     assert (status, error) == (0, "")
     return open_gate(Path(folder / "run"), cell=Path(folder / "cell.yaml"))
@@ -113,9 +113,17 @@ def test_points_lie_on_the_path_and_the_process_goes_on_and_off_at_its_ends(text
         assert np.linalg.norm(X[:3, 3] - centre) == pytest.approx(0.08, abs=1e-6)
         np.testing.assert_allclose(X[:3, 2], [0.0, 0.0, -1.0], atol=1e-5)
     first, inner, last = (X[:3, 3] for X in points(text, "corner"))
-    np.testing.assert_allclose(
-        [first, inner, last], [[0.8, -0.15, 0.33], [1.2, -0.15, 0.33], [1.2, 0.15, 0.33]], atol=1e-6
-    )
+    desired = [[0.8, -0.15, 0.33], [1.20103, -0.15, 0.33], [1.20103, 0.15, 0.33]]
+    np.testing.assert_allclose([first, inner, last], desired, atol=1e-6)  # half a step of 4 ms beside rest: 0.8 um
+
+
+@pytest.mark.slow
+def test_the_head_says_how_many_rows_are_rounded(prepared: PreparedExport, run: VerifiedRun) -> None:
+    module = write(run, prepared).files["arm.mod"]
+    head = re.search(r"! (\d+) of \d+ rows rounded", module)
+
+    assert head is not None
+    assert int(head[1]) == len(re.findall(r"^    \w+ .*\bz_\d+\b", module, re.M))
 
 
 @pytest.mark.slow
@@ -150,7 +158,7 @@ CHANGES = {
     "tool frame": (r"(tooldata t_arm := \[TRUE,\[\[.*?\],\[)(-?\d\.\d+)", r"\g<1>1.0000000"),
     "tool": (r"(MoveL corner_4.*),t_arm", r"\1,tool0"),
     "configuration": (r"(robtarget corner_2 := .*\[)(-?\d)(,-?\d,-?\d,\d\])", r"\g<1>3\3"),
-    "point": (r"(robtarget corner_2 := \[\[)200\.0000", r"\g<1>200.2000"),
+    "point": (r"(robtarget corner_2 := \[\[)201\.0300", r"\g<1>201.2300"),
     "on and off": (r"DispLStart corner_1(.*)DispLEnd", r"DispLEnd corner_1\1DispLStart"),
     "fine at the end": (r"(DispLEnd corner_3,s_40,bead2),fine", r"\1,z_158"),
     "a zone for another": (r"(DispL corner_2,s_40,bead2),z_\d+", r"\1,z_9999"),
