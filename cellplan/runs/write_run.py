@@ -26,7 +26,7 @@ from cellplan.runs.drawings.picture import FLOOR_PLAN, STILL, drawings_by_place
 from cellplan.runs.solution import Run, Solution
 
 # packages whose arithmetic the result rests on
-ENGINES: Final = ("numpy", "pin", "python-fcl", "coal", "daqp", "trimesh")
+ENGINES: Final = ("numpy", "pin", "python-fcl", "coal", "daqp")
 
 
 def write_run(
