@@ -46,6 +46,8 @@ class Dialect:
     # whether its files round rows within a share of their segments; not those on the cycle either
     is_rounded: bool = False
     shares: tuple[float, ...] = SHARES  # of its segments within which a row may be rounded, the largest first, 0 last
+    # distance from a corner in [m] below which files state none within which it is rounded
+    smallest_zone: float = 0.0
     sets_steps: bool = False  # whether its programs set a step register at their marks, see ``elements.escapes``
     lags: bool = False  # whether the target follows with a latency, which must be stated before ``timed`` is promised
     most_arms: int | None = None  # arms that its programs can move in step; None for any number

@@ -25,7 +25,7 @@ from cellplan.programs.rows.part_targets import with_part_poses
 from cellplan.programs.rows.resample import lead_time, resampled
 from cellplan.programs.rows.rows import essential_rows, full_rows
 from cellplan.programs.rows.thin import ThinningLimits, thinned
-from cellplan.programs.seams.choose import on_moving_parts, with_seams
+from cellplan.programs.seams.choose import LineLimits, on_moving_parts, with_seams
 from cellplan.programs.seams.executed import executed_programs
 from cellplan.programs.shared import Shared
 
@@ -145,8 +145,9 @@ def _with_lines(
             by_joints[task] = f"'{holder}' moves the part while the tool works"
             if frame.moves is Moves.LINEAR:
                 raise NotVerifiedError([f"--moves linear: task '{task}': {by_joints[task]}"])
+    limits = LineLimits(most, dialect.smallest_zone)
     while True:
-        lines = with_seams(shared.scene, job, full, essential, most=most, by_joints=by_joints)
+        lines = with_seams(shared.scene, job, full, essential, limits=limits, by_joints=by_joints)
         if frame.moves is Moves.LINEAR:
             return lines, by_joints
         if not any(rows.seams for program in lines.programs for rows in program.robots.values()):

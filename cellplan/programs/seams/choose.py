@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from cellplan.geometry.arrays import Flags
 from cellplan.geometry.transforms import Array, inverse, rotation_vector
 from cellplan.measures.tool_errors import error_lengths, part_poses
 from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows, Seam
@@ -43,6 +44,13 @@ class Piece(NamedTuple):
     through: Array | None = None  # the pose there, turned as the arc turns the tool, shape (4, 4)
 
 
+class LineLimits(NamedTuple):
+    """How near lines and arcs are to the path of a tool."""
+
+    most: float  # how far a tool may be off by rows left out, in [m]
+    smallest_zone: float = 0.0  # distance from a corner in [m] below which the format states none, see ``Dialect``
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolPath:
     """The path of a tool in the frame of a part."""
@@ -54,6 +62,7 @@ class ToolPath:
     # joints that move evenly along each line and arc, as shares of what they may be off, shape (N, k); None unless they
     # move in step
     held: Array | None = None
+    smallest_zone: float = 0.0  # distance from a corner in process in [m] within which it cannot be rounded by number
 
     def pieces(self, ends: Sequence[int]) -> Iterator[Piece]:
         """The longest lines and arcs, one after the other, which end at some rows, increasing."""
@@ -65,6 +74,26 @@ class ToolPath:
             if len(pieces) > 2 and pieces[-1].shape.length <= self.least:
                 pieces[-2:] = self._halves(pieces[-3].last, end) or pieces[-2:]
             yield from pieces[1:]
+
+    def divided(self, pieces: Sequence[Piece], in_process: Flags) -> Iterator[Piece]:
+        """The same, with a short line before each corner in process that may be rounded less than can be stated.
+
+        Controllers begin no corner before the middle of the shorter motion: half of that line is what it may be
+        rounded by. ``in_process`` are rows at which a process goes on, shape (N,).
+        """
+        ends, shares = [0, *(piece.last for piece in pieces)], [*_cuts(self, pieces), 0.0]
+        for begin, piece, other, share in zip(ends, pieces, [*pieces[1:], pieces[-1]], shares, strict=False):
+            zone = share * min(piece.shape.length, other.shape.length)
+            is_short = 0.0 < zone < self.smallest_zone and share < LARGEST_SHARE and bool(in_process[piece.last])
+            yield from (is_short and self._with_short(begin, piece, 2.0 * zone)) or [piece]
+
+    def _with_short(self, begin: int, piece: Piece, longest: float) -> list[Piece]:
+        """A piece and behind it a line, of at most a length in [m], to its end; none where no row is so near to it."""
+        p = self.X_PT[begin + 1 : piece.last + 1, :3, 3]
+        row = begin + 1 + int(np.argmax(np.linalg.norm(p - p[-1], axis=1) <= longest))
+        parts = [self._piece(begin, row, is_arc=piece.middle is not None), self._piece(row, piece.last)]
+        both = [part for part in parts if part is not None and part.shape.length > STANDS]
+        return both if len(both) == len(parts) else []
 
     def _halves(self, first: int, end: int) -> list[Piece]:
         """Two lines or arcs of as many rows; none where there are no such ones."""
@@ -90,7 +119,7 @@ class ToolPath:
             trial = (low.last + high) // 2
         return low
 
-    def _piece(self, first: int, last: int, *, is_arc: bool) -> Piece | None:
+    def _piece(self, first: int, last: int, *, is_arc: bool = False) -> Piece | None:
         """The line or the arc between two rows; None where it does not follow the tool."""
         X = self.X_PT[first : last + 1]
         if not is_arc:
@@ -131,7 +160,7 @@ def with_seams(
     full: Sequence[ProgramRows],
     essential: Sequence[EssentialRows],
     *,
-    most: float,
+    limits: LineLimits,
     by_joints: Collection[str] = (),
 ) -> ExportJob:
     """A job whose robots move their tools on lines and arcs, but for some tasks, which have no process then.
@@ -142,13 +171,13 @@ def with_seams(
         job: Rows of joints, some left out, with their marks and their rounding.
         full: All rows of its programs, with the same marks.
         essential: The phases of its programs.
-        most: How far a tool may be off its path by rows left out, in [m].
+        limits: How near they are to its path.
         by_joints: Names of tasks whose tools move by joints; on all others the part rests, see ``on_moving_parts``.
     """
     programs = []
     for program, every, phases in zip(job.programs, full, essential, strict=True):
         robots = {
-            name: _seams_of(scene, job, (rows, every), phases.work, most=most, by_joints=by_joints)
+            name: _seams_of(scene, job, (rows, every), phases.work, limits=limits, by_joints=by_joints)
             for name, rows in program.robots.items()
             if job.frame.promise.waits or Axes.of(job.frame.robot(name)).arm
         }
@@ -194,6 +223,9 @@ class _SeamRows:
         """Follow the tool on lines and arcs from one row to another, with ends at the corners of its path."""
         self.chosen -= set(range(first + 1, last))
         pieces = list(path.pieces(_piece_ends(path, self.rows, (first, last), corners)))
+        if self.rows.process is not None:
+            goes_on = self.rows.process & ~switches(self.rows)
+            pieces = list(path.divided(pieces, goes_on[first : last + 1]))
         ends = [0, *(piece.last for piece in pieces)]
         for begin, piece in zip(ends, pieces, strict=False):
             feed = _feed(path, self.rows, (first, begin, piece.last))
@@ -256,7 +288,7 @@ def _seams_of(
     both: tuple[RobotRows, ProgramRows],
     work: Sequence[WorkRows],
     *,
-    most: float,
+    limits: LineLimits,
     by_joints: Collection[str],
 ) -> RobotRows:
     """The rows of one robot, with its seams; ``both`` are those of its joints, and all of the program."""
@@ -276,12 +308,14 @@ def _seams_of(
         elif task is not None and task.name in by_joints:
             state.switch_off(first, last)
         elif task is not None:
-            path = _path(scene, every, task, phase, most, in_step=in_step)
+            path = _path(scene, every, task, phase, limits, in_step=in_step)
             state.follow(path, first, last, corners=phase.corners[task.name])
     return state.assembled()
 
 
-def _path(scene: Scene, every: ProgramRows, task: Task, phase: WorkRows, most: float, *, in_step: bool) -> ToolPath:
+def _path(
+    scene: Scene, every: ProgramRows, task: Task, phase: WorkRows, limits: LineLimits, *, in_step: bool
+) -> ToolPath:
     """The path of the tool of a task in a phase."""
     q = {name: rows.q[phase.rows] for name, rows in every.robots.items()}
     is_on_part = task.relative_to is Frame.PART
@@ -296,7 +330,8 @@ def _path(scene: Scene, every: ProgramRows, task: Task, phase: WorkRows, most: f
         for name in every.robots
         if in_step and name != task.robot
     ]
-    return ToolPath(task=task, X_PT=X_PT, most=most, least=least, held=np.hstack(held) if held else None)
+    path = ToolPath(task=task, X_PT=X_PT, most=limits.most, least=least, held=np.hstack(held) if held else None)
+    return path if process is None else replace(path, smallest_zone=limits.smallest_zone)
 
 
 def _shorter(q: Array, places: Sequence[int]) -> dict[int, float]:

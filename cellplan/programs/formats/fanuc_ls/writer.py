@@ -10,6 +10,7 @@ import numpy as np
 from cellplan.errors import InputError, raise_findings, refusals
 from cellplan.geometry.arrays import Flags
 from cellplan.model.report.exported import ExportJob, Moves, ProgramRows, Promise, RobotRows
+from cellplan.model.units import MM
 from cellplan.programs.elements.corners import LARGEST_SHARE, row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.head import head_notes
@@ -134,6 +135,7 @@ FANUC_LS: Final[Dialect] = Dialect(
     is_thinned=True,
     is_rounded=True,
     shares=SHARES,
+    smallest_zone=1.0 / MM,
     split=PAGE,
     moves=tuple(Moves),
     configuration=configuration,
