@@ -76,22 +76,27 @@ class ToolPath:
             yield from pieces[1:]
 
     def divided(self, pieces: Sequence[Piece], in_process: Flags) -> Iterator[Piece]:
-        """The same, with a short line before each corner in process that may be rounded less than can be stated.
+        """The same, with a short one before each corner in process that may be rounded less than can be stated.
 
-        Controllers begin no corner before the middle of the shorter motion: half of that line is what it may be
+        Controllers begin no corner before the middle of the shorter motion: half of that one is what it may be
         rounded by. ``in_process`` are rows at which a process goes on, shape (N,).
         """
         ends, shares = [0, *(piece.last for piece in pieces)], [*_cuts(self, pieces), 0.0]
         for begin, piece, other, share in zip(ends, pieces, [*pieces[1:], pieces[-1]], shares, strict=False):
+            places = [begin if piece.middle is None else piece.middle, piece.last, other.middle or other.last]
+            chords = np.linalg.norm(np.diff(self.X_PT[places, :3, 3], axis=0), axis=1)  # as ``shorter_lengths``
+            is_short = share * float(chords.min()) < self.smallest_zone and 0.0 < share < LARGEST_SHARE
             zone = share * min(piece.shape.length, other.shape.length)
-            is_short = 0.0 < zone < self.smallest_zone and share < LARGEST_SHARE and bool(in_process[piece.last])
-            yield from (is_short and self._with_short(begin, piece, 2.0 * zone)) or [piece]
+            parts = self._with_short(begin, piece, 2.0 * zone) if is_short and in_process[piece.last] else []
+            yield from parts or [piece]
 
     def _with_short(self, begin: int, piece: Piece, longest: float) -> list[Piece]:
-        """A piece and behind it a line, of at most a length in [m], to its end; none where no row is so near to it."""
+        """A piece and behind it another, of at most a length in [m], to its end; none where no row is so near to it."""
+        is_arc = piece.middle is not None
         p = self.X_PT[begin + 1 : piece.last + 1, :3, 3]
         row = begin + 1 + int(np.argmax(np.linalg.norm(p - p[-1], axis=1) <= longest))
-        parts = [self._piece(begin, row, is_arc=piece.middle is not None), self._piece(row, piece.last)]
+        ahead = self._piece(row, piece.last, is_arc=is_arc) or self._piece(row, piece.last)
+        parts = [self._piece(begin, row, is_arc=is_arc), ahead]
         both = [part for part in parts if part is not None and part.shape.length > STANDS]
         return both if len(both) == len(parts) else []
 

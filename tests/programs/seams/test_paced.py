@@ -295,6 +295,27 @@ def test_a_line_at_a_speed_that_a_joint_cannot_follow_is_refused(frame: ExportFr
     assert re.search(r"joint J\d of 'arm' would move at \d.* deg/s at 4e\+04 mm/s, allowed", message)
 
 
+@pytest.mark.slow
+def test_corners_that_tp_cannot_state_have_a_point_more(tmp_path: Path) -> None:
+    """A right angle with 0.5 mm of tolerance is rounded within 0.18 mm, arcs of one circle within 2 mm."""
+    statements = "process: {on: 'DO[7]=ON', off: 'DO[7]=OFF'}"
+    text = re.sub(r"process:\n +on:.*\n +inner:.*\n +off:.*\n +data:.*", statements, BEAD.read_text("utf-8"), count=1)
+    text = text.replace("kind: abb", "kind: fanuc").replace("{id: irc5,", "{id: irc5, tool_number: 1, frames: [1],")
+    (tmp_path / "cell.yaml").write_text(text, encoding="utf-8")
+    export = "cellplan export run --cell cell.yaml --format fanuc_ls --moves linear -o tp"
+    for command in ("cellplan solve cell.yaml -o run --quiet", export, "cellplan verify tp --run run --cell cell.yaml"):
+        assert run_command(command, tmp_path)[0] == 0
+
+    corner, ring = ((tmp_path / "tp" / f"ARM_{name}.ls").read_text(encoding="utf-8") for name in ("CORNER", "RING"))
+    endings = r" 40mm/sec (\w+)"
+    assert re.findall(endings, corner) == ["CR1", "CR1", "FINE"]
+    assert re.findall(endings, ring) == ["CR2", "CR1", "CR2", "CR1", "FINE"]
+    places = re.findall(r"X = (\S+) mm, Y = (\S+) mm, Z = (\S+) mm", corner)
+    before, at, _, _ = np.diff(np.array(places, dtype=float), axis=0)
+    assert 0.2 < np.linalg.norm(at) <= 2.0 * 0.25 * 0.5 * np.sqrt(2.0)
+    np.testing.assert_allclose(at / np.linalg.norm(at), before / np.linalg.norm(before), atol=1e-3)
+
+
 @pytest.fixture(scope="module")
 def yaskawa(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of the solved cell with an arm of Yaskawa, and of what states other position levels."""

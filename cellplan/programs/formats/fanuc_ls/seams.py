@@ -88,7 +88,8 @@ def _ending(move: Move, share: float) -> str:
         raise LineRefusedError(
             move.seam.task,
             f": row {move.row + 1}: a corner in process may be rounded {MM * move.zone:.2g} mm before its point, less "
-            "than a millimetre: allow more (tolerance), or divide the task there",
+            "than a millimetre, and no row of the run is near enough for a point before it: allow more (tolerance), "
+            "state a smaller step (motion.step_s), or divide the task there",
         )
     return f"CR{region}" if region else "FINE"
 
