@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from builders.elbow_arm import closed_form, tip
-from builders.export_jobs import positioner_model
-from builders.scene_builders import held_part, placed
+from builders.export_jobs import controlled, positioner_model, signals
+from builders.scene_builders import arm_model, held_part, placed
 from builders.seam_jobs import CONTROLLER, KUKA_ZERO, ROBOT, SEAM, TASK, VALVE, X_WP, poses, seam_job
 from cellplan.geometry.transforms import Array, inverse, pose
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportJob, ProgramRows, Promise, RobotRows, Station
-from cellplan.model.settings.controllers import RobotControlEntry
+from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.programs.seams.shapes import Shape, arc, line
 
 TABLE = "table"
@@ -69,6 +69,22 @@ def job_in_step(*, number: int | None = None) -> ExportJob:
         ROBOT: replace(rows, q=q),
     }
     return replace(job, frame=frame, programs=(ProgramRows(name=None, robots=robots),))
+
+
+def job_beside() -> ExportJob:
+    """The same beside an arm of another controller, for which it waits at its first and last row and in its seam."""
+    job, other = job_in_step(), controlled("beta", arm_model(), id="another")
+    wires = signals([ROBOT, other.name])
+    robots = tuple(
+        replace(one, control=one.control.model_copy(update={"handshake": wires.get(one.name)}))
+        for one in (*job.frame.cell.robots, other)
+        if one.control is not None
+    )
+    kinds = {**job.frame.cell.controllers, "another": ControllerEntry(kind="abb")}
+    cell = replace(job.frame.cell, robots=robots, controllers=kinds)
+    waiting = {name: replace(rows, marks=(0, 5, 7)) for name, rows in job.programs[0].robots.items()}
+    frame = replace(job.frame, cell=cell, promise=Promise.PACED)
+    return replace(job, frame=frame, programs=(ProgramRows(name=None, robots=waiting),))
 
 
 def run_in_step(job: ExportJob, *, steps: int = 20, uneven: float = 0.0) -> ProgramRows:

@@ -18,6 +18,8 @@ from cellplan.model.report.exported import ExportFrame, ExportJob, Interpolation
 from cellplan.model.report.verified_run import AnyRun, VerifiedRun
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.handshake import speakers
+from cellplan.programs.elements.joints import in_step
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import Choice, exported_robots
 from cellplan.programs.export.notes import READ_BACK
@@ -157,9 +159,9 @@ def _program(
     """The rows as a format holds them, and the time in [s] by which they are later."""
     every, promise, robots = list(range(len(rows))), frame.promise, dict[str, RobotRows]()
     for name in frame.robots:
-        q = rows if promise is Promise.SYNCHRONISED else rows[:, cell.columns(name)]
+        q = np.hstack([rows[:, cell.columns(other)] for other in in_step(frame, name)])
         selected = every if promise is Promise.TIMED else _bend_rows(q, legs)
-        waits_there = promise is Promise.SEQUENCE_ONLY and len(cell.robots) > 1
+        waits_there = promise is Promise.SEQUENCE_ONLY and len(speakers(frame)) > 1
         ends = [0, *(leg.last for leg in legs)] if waits_there else []
         robots[name] = _rows(cell, name, rows[selected], np.array(selected), [selected.index(row) for row in ends])
     program = ProgramRows(name=None, robots=robots)

@@ -1,13 +1,13 @@
 """Corners: the rows that a target may round, of all robots of a program, and within which share of their segments."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
-from cellplan.model.report.exported import ExportJob, ProgramRows, Promise, RobotRows
-from cellplan.programs.elements.joints import Axes
+from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows
+from cellplan.programs.elements.joints import Axes, in_step
 from cellplan.programs.elements.timed_rows import are_near
 
 LARGEST_SHARE: Final = 0.5  # [-] controllers cut zones to half of a segment
@@ -15,12 +15,12 @@ SAME_TIME: Final = 1e-7  # [s] rows nearer than this are at one instant
 AT_REST: Final = 1e-9  # [rad] or [m] a robot that moves no joint by more stands still
 
 
-def may_round(program: ProgramRows, promise: Promise) -> dict[str, Flags]:
+def may_round(program: ProgramRows, units: Collection[Sequence[str]] = ()) -> dict[str, Flags]:
     """Rows that targets may round, by robot, shape (N,).
 
     These are all rows but the first and the last one, marks, rows at which the process of any robot of the program goes
-    on or off, and rows at which a robot rests or its tool has to stop. Robots that move in step round the same rows:
-    those that none of the moving ones must not round.
+    on or off, and rows at which a robot rests or its tool has to stop. Robots of a unit, which move in step, round the
+    same rows: those that none of the moving ones must not round.
     """
     switch_times = _switch_times(program)
     flags = {}
@@ -29,17 +29,21 @@ def may_round(program: ProgramRows, promise: Promise) -> dict[str, Flags]:
         free[[0, -1, *rows.marks, *rows.stops]] = False
         is_switch = switches(rows) if rows.times is None else are_near(rows.times, switch_times, SAME_TIME)
         flags[name] = free & ~is_switch
-    if promise is Promise.SYNCHRONISED:
-        moving = {name: moves(rows) for name, rows in program.robots.items()}
+    result = dict[str, Flags]()
+    for unit in units or [[name] for name in flags]:
+        moving = {name: moves(program.robots[name]) for name in unit}
         allowed = [
-            flags[name] & (~np.any(moving[name], axis=0) | _runs(rows, moving[name]))
-            for name, rows in program.robots.items()
+            flags[name] & (~np.any(moves_there, axis=0) | _runs(program.robots[name], moves_there))
+            for name, moves_there in moving.items()
         ]
-        shared: Flags = np.logical_and.reduce(allowed) & np.logical_or.reduce(
-            [np.any(m, axis=0) for m in moving.values()]
-        )
-        return dict.fromkeys(flags, shared)
-    return {name: flags[name] & _runs(rows, moves(rows)) for name, rows in program.robots.items()}
+        moves_any = np.logical_or.reduce([np.any(moves_there, axis=0) for moves_there in moving.values()])
+        result |= dict.fromkeys(unit, np.logical_and.reduce(allowed) & moves_any)
+    return {name: result[name] for name in flags}
+
+
+def units_of(frame: ExportFrame) -> list[tuple[str, ...]]:
+    """Exported robots by what moves in step."""
+    return list(dict.fromkeys(in_step(frame, name) for name in frame.robots))
 
 
 def row_shares(job: ExportJob, program: ProgramRows) -> Mapping[str, Array]:
@@ -53,7 +57,7 @@ def row_shares(job: ExportJob, program: ProgramRows) -> Mapping[str, Array]:
     chosen = {name: chosen_shares(job, rows) for name, rows in program.robots.items()}
     if not any(np.any(shares > 0.0) for shares in chosen.values()):
         return chosen
-    free = may_round(program, job.frame.promise)
+    free = may_round(program, units_of(job.frame))
     has_arm = {name: bool(Axes.of(job.frame.robot(name)).arm) for name in free}
     return {
         name: np.where(free[name] & (share > 0.0), share if has_arm[name] else LARGEST_SHARE, 0.0)

@@ -22,8 +22,14 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step, task_group
-from cellplan.programs.elements.joints import Angle, Axes, from_numbers
+from cellplan.programs.elements.handshake import (
+    HandshakeStep,
+    handshake_steps,
+    lowering_step,
+    speakers,
+    task_group,
+)
+from cellplan.programs.elements.joints import Angle, Axes, from_numbers, unit_of
 from cellplan.programs.elements.paced import Events
 
 REGISTER: Final = "cell_step"  # name of a step register where the cell states none
@@ -137,7 +143,7 @@ def agreement_steps(frame: ExportFrame, robot: str, *, is_odd: bool) -> list[Han
 
     None at all for a robot by itself.
     """
-    steps, leads = handshake_steps(frame, robot), robot == frame.cell.robots[0].name
+    steps, leads = handshake_steps(frame, robot), robot == speakers(frame)[0]
     if not steps:
         return []
     raised, lowered = ([step for step in steps if step.waits and step.is_on is is_on] for is_on in (True, False))
@@ -196,6 +202,9 @@ def _require_one_program(frame: ExportFrame) -> None:
             f"robots.{group[0]}.controller.handshake: expected the inputs that {', '.join(map(repr, group[1:]))} set, "
             "as escape programs ask one another by wires, got none"
         )
+    for arm, *others in (unit_of(frame.cell, name) for name in frame.robots):
+        if others:
+            raise InputError(f"--escape: expected arms that move no positioner, got '{others[0]}' in step with '{arm}'")
 
 
 def read_escape(form: EscapeForm, expected: EscapeProgram, files: Mapping[str, str]) -> EscapeProgram:

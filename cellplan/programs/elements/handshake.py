@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 from cellplan.errors import InputError, raise_findings, refusals
 from cellplan.model.report.exported import ExportFrame
 from cellplan.model.settings.controllers import HandshakeEntry
+from cellplan.programs.elements.joints import unit_of
 
 MEETINGS: Final = ("sync_mark", "sync_go")  # where tasks of one controller meet: at a mark, and before they go on
 
@@ -38,7 +39,7 @@ def handshake_steps(frame: ExportFrame, robot: str) -> tuple[HandshakeStep, ...]
     if not task_group(frame, robot):
         return wires
     arrive, leave = (HandshakeStep(True, name, True, meets=True) for name in MEETINGS)
-    return (arrive, *wires, leave) if len(_speakers(frame)) > 1 else (arrive,)
+    return (arrive, *wires, leave) if len(speakers(frame)) > 1 else (arrive,)
 
 
 def task_group(frame: ExportFrame, robot: str) -> tuple[str, ...]:
@@ -56,10 +57,10 @@ def task_group(frame: ExportFrame, robot: str) -> tuple[str, ...]:
     return tuple(group) if len(group) > 1 and not is_wired else ()
 
 
-def _speakers(frame: ExportFrame) -> list[str]:
-    """Robots that wait for others by wires: of tasks that meet without any, the first."""
+def speakers(frame: ExportFrame) -> list[str]:
+    """Robots that wait for others by wires: of tasks that meet without any, the first, and no external axes."""
     names = [robot.name for robot in frame.cell.robots]
-    return [name for name in names if name in (task_group(frame, name) or (name,))[:1]]
+    return [name for name in names if name in (task_group(frame, name) or unit_of(frame.cell, name))[:1]]
 
 
 def _wires(frame: ExportFrame, robot: str) -> list[HandshakeStep]:
@@ -67,7 +68,7 @@ def _wires(frame: ExportFrame, robot: str) -> list[HandshakeStep]:
     others = _senders(frame, robot)
     if not others:
         return []
-    signals, leads = _signals(frame, robot), robot == frame.cell.robots[0].name
+    signals, leads = _signals(frame, robot), robot == speakers(frame)[0]
     inputs = [_input(signals, robot, other) for other in others]
     steps: list[HandshakeStep] = []
     for is_on in (True, False):
@@ -113,7 +114,7 @@ def require_signals(frame: ExportFrame, robot: str) -> None:
 
 def _senders(frame: ExportFrame, robot: str) -> list[str]:
     """Robots whose outputs a robot reads: those of all others if it leads, or else that of the leader, if any."""
-    leader, *others = _speakers(frame)
+    leader, *others = speakers(frame)
     return others if robot == leader else [leader] * (robot in others)
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell.cell import Robot
+from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.report.exported import ExportFrame, Promise
 from cellplan.model.robot.controller import ControllerZero
 from cellplan.model.robot.robot import Joint
 from cellplan.model.units import MM
@@ -38,6 +39,27 @@ class Axes:
         count = len(robot.model.joints)
         first = count - ARM if count >= ARM else count
         return cls(arm=tuple(range(first, count)), external=tuple(range(first)))
+
+
+def unit_of(cell: Cell, robot: str) -> tuple[str, ...]:
+    """A robot and those whose axes one program moves in step with it, the arm first; as a rule itself alone.
+
+    On a KUKA controller the axes of positioners beside one arm are external axes of that arm.
+    """
+    control = cell.robot(robot).control
+    controller = None if control is None else cell.controllers.get(control.id)
+    if control is None or controller is None or controller.kind != "kuka":
+        return (robot,)
+    others = [one for one in cell.robots if one.control is not None and one.control.id == control.id]
+    arms = [one.name for one in others if Axes.of(one).arm]
+    return (*arms, *(one.name for one in others if one.name not in arms)) if len(arms) == 1 else (robot,)
+
+
+def in_step(frame: ExportFrame, robot: str) -> tuple[str, ...]:
+    """Robots of an export that pass the same rows as one of them at the same time, itself among them."""
+    if frame.promise is Promise.SYNCHRONISED:
+        return frame.robots
+    return tuple(name for name in unit_of(frame.cell, robot) if name in frame.robots)
 
 
 def require_counted(robot: Robot, kind: str) -> None:

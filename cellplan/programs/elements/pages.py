@@ -154,14 +154,19 @@ def render_programs(
     """
     robots, files = list(dict.fromkeys(robot for _, robot in paths)), dict[str, str]()
     for program in job.programs:
-        rows_of = {name: program.robots[name] for name in robots}
-        if len({len(rows.marks) for rows in rows_of.values()}) > 1 or not all(map(len, rows_of.values())):
-            got = ", ".join(f"{len(rows)} and {len(rows.marks)} of '{name}'" for name, rows in rows_of.items())
-            name = program.name or job.frame.cell.name
-            raise InputError(f"program '{name}': expected rows, and equal marks, got {got}")
+        require_rows(job, program)
         for robot in robots:
             files |= files_of(paged(job, dialect, program, robot, paths[program.name, robot]))
     return files
+
+
+def require_rows(job: ExportJob, program: ProgramRows) -> None:
+    """Refuse robots that do not meet at equally many marks, or have no row."""
+    rows_of = program.robots
+    if len({len(rows.marks) for rows in rows_of.values()}) > 1 or not all(map(len, rows_of.values())):
+        got = ", ".join(f"{len(rows)} and {len(rows.marks)} of '{name}'" for name, rows in rows_of.items())
+        name = program.name or job.frame.cell.name
+        raise InputError(f"program '{name}': expected rows, and equal marks, got {got}")
 
 
 def paged(job: ExportJob, dialect: Dialect, program: ProgramRows, robot: str, path: str) -> PagedProgram:

@@ -10,8 +10,10 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, ProgramRows, Promise
 from cellplan.model.report.verified_run import AnyRun, ReadRun, UnsolvedRun, VerifiedRun
 from cellplan.model.units import DEG, MM
+from cellplan.programs.elements.corners import units_of
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.handshake import require_signals
+from cellplan.programs.elements.handshake import require_signals, speakers
+from cellplan.programs.elements.joints import in_step
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import THIN_DEG, THIN_MM, Choice, exported_robots
 from cellplan.programs.judgement.round_rows import stops_left, with_rounding
@@ -77,13 +79,13 @@ def prepare(
     moves = choice.moves if no_line is None else Moves.JOINTS
     promised = choose_promise(run, dialect, robots, skew=skew, requested=choice.promise, moves=moves)
     if no_line is not None:
-        in_step = promised.promise is Promise.SYNCHRONISED
-        choice = replace(choice, moves=moves) if in_step else choice
-        what = "no lines" if in_step else f"not {Promise.PACED}"
+        is_in_step = promised.promise is Promise.SYNCHRONISED
+        choice = replace(choice, moves=moves) if is_in_step else choice
+        what = "no lines" if is_in_step else f"not {Promise.PACED}"
         promised = replace(promised, reasons=(*promised.reasons, f"{what}: {no_line}"))
     frame = frame_of(run, dialect, robots, promised.promise, choice)
     raise_findings(unmet_demands(run, dialect, frame, choice))
-    has_waits = promised.promise.waits and len(run.cell.robots) > 1
+    has_waits = promised.promise.waits and len(speakers(frame)) > 1
     orders = shared.orders(progress) if has_waits else ()
     try:
         job, lead, remarks = _job(shared, dialect, choice, frame=frame, orders=orders)
@@ -141,7 +143,7 @@ def _with_lines(
     frame, essential = job.frame, essential_rows(shared.run)
     by_joints: dict[str, str] = {}
     for task, holder in on_moving_parts(full, essential) if frame.promise.waits else ():
-        if frame.cell.task(task).robot in frame.robots:
+        if (robot := frame.cell.task(task).robot) in frame.robots and holder not in in_step(frame, robot):
             by_joints[task] = f"'{holder}' moves the part while the tool works"
             if frame.moves is Moves.LINEAR:
                 raise NotVerifiedError([f"--moves linear: task '{task}': {by_joints[task]}"])
@@ -259,9 +261,9 @@ def thinning_of(dialect: Dialect, promise: Promise, choice: Choice) -> tuple[flo
 
 
 def row_groups(frame: ExportFrame) -> list[list[str]]:
-    """Robots that keep the same rows: all of a controller where they are to stay together, or else each its own."""
+    """Robots that keep the same rows: all of a controller where they are to stay together, or else those in step."""
     if frame.promise not in BOTH:
-        return [[name] for name in frame.robots]
+        return [list(unit) for unit in units_of(frame)]
     groups: dict[str, list[str]] = {}
     for name, controller in controllers_of(frame.cell, frame.robots).items():
         groups.setdefault(controller, []).append(name)

@@ -18,9 +18,9 @@ from cellplan.geometry.arrays import Array, Flags
 from cellplan.measures.tool_depth import tool_depths
 from cellplan.measures.tool_errors import error_lengths, part_poses, relative_to_task_frame
 from cellplan.model.cell.cell import Relation, stacked_positions
-from cellplan.model.report.exported import ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows
 from cellplan.model.task.task import Task
-from cellplan.programs.elements.corners import LARGEST_SHARE, may_round, row_shares
+from cellplan.programs.elements.corners import LARGEST_SHARE, may_round, row_shares, units_of
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.judgement.judge import played_programs
 from cellplan.programs.judgement.judge_path import PathRows, keeps_clearance, keeps_tools, path_rows, schedule_at
@@ -82,7 +82,7 @@ def stops_left(job: ExportJob) -> tuple[int, int]:
     """Rows of a job that may be rounded and are not, and all that may be."""
     stops = count = 0
     for program in job.programs:
-        free, shares = may_round(program, job.frame.promise), row_shares(job, program)
+        free, shares = may_round(program, units_of(job.frame)), row_shares(job, program)
         stops += sum(int(np.count_nonzero(free[name] & (shares[name] == 0.0))) for name in free)
         count += sum(int(np.count_nonzero(shares)) for shares in free.values())
     return stops, count
@@ -101,10 +101,10 @@ class _Choice:
     ) -> None:
         self._ladder = np.array(ladder[::-1])  # shares that the format can state, the smallest first
         self._job, self._given, self._played, self._shared = job, program, played, shared
-        self._free = may_round(program, job.frame.promise)
+        self._units = units_of(job.frame)
+        self._free = may_round(program, self._units)
         self._chosen = {name: np.where(free, self._ladder[-1], 0.0) for name, free in self._free.items()}
         self._times = {name: times_of(played.rows[name]) for name in self._chosen}
-        self._in_step = job.frame.promise is Promise.SYNCHRONISED
 
     @property
     def program(self) -> ProgramRows:
@@ -193,9 +193,10 @@ class _Choice:
         """Lower the shares of the rows of some robots that are rounded at some times; whether there were any."""
         shares, lowered = self._shares(), False
         rows_of = {name: _rounded_at(self._times[name], shares[name], times) for name in self._chosen if name in movers}
-        if self._in_step and rows_of:
-            every = np.any(list(rows_of.values()), axis=0)
-            rows_of = {name: every.copy() for name in self._chosen}
+        for unit in self._units:
+            if every := [rows_of[name] for name in unit if name in rows_of]:
+                shared: Flags = np.any(every, axis=0)
+                rows_of |= dict.fromkeys(unit, shared)
         for name, is_near in rows_of.items():
             chosen = self._chosen[name]
             is_lowered = is_near & (chosen > 0.0)
@@ -215,9 +216,8 @@ class _Choice:
             off[:, scene.cell.columns(name)] = np.abs(corner_vectors(executed, np.ones(len(executed))))
             approach = np.sort(body_reach(arms, scene, off), axis=0)[-2:].sum(axis=0)
             most[name] = reach / np.maximum(approach, 1e-12)
-        if self._in_step:
-            least = np.min(list(most.values()), axis=0)
-            most = dict.fromkeys(most, least)
+        for unit in self._units:
+            most |= dict.fromkeys(unit, np.min([most[name] for name in unit], axis=0))
         for name, rows in names.items():
             self._chosen[name][rows] = np.minimum(
                 self._chosen[name][rows], _largest_within(most[name][rows], self._ladder)

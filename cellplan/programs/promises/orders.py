@@ -22,6 +22,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report.exported import ProgramRows
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.model.units import MM
+from cellplan.programs.elements.joints import unit_of
 from cellplan.programs.promises.run_programs import RunPhase, RunProgram, run_programs, scenes_of
 from cellplan.programs.rows.margins import raised
 from cellplan.runs.plan.program import STILL_TOL
@@ -143,7 +144,7 @@ class PhaseSearch:
 
     def __init__(self, cell: Cell, scene: Scene, program: RunProgram, phase: RunPhase) -> None:
         """Take the rows of a phase, and the scene while its tasks are worked on."""
-        self._scene, self._phase = scene, phase
+        self._cell, self._scene, self._phase = cell, scene, phase
         self._times = program.times[phase.first : phase.last + 1]
         rows = program.q[phase.first : phase.last + 1]
         self._q = {robot.name: rows[:, cell.columns(robot.name)] for robot in cell.robots}
@@ -157,7 +158,7 @@ class PhaseSearch:
 
     def stretches(self) -> Iterator[OrderStretch]:
         """The stretches of the phase: the longest from its first row on that is clear, and so on."""
-        pairs = tuple(combinations(self._q, 2))
+        pairs = tuple(pair for pair in combinations(self._q, 2) if pair[1] not in unit_of(self._cell, pair[0]))
         first = 0
         while first < self._last:
             bounds = self._bounds(first, self._last, pairs)

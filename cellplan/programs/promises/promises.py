@@ -14,7 +14,7 @@ from cellplan.model.task.task import Service
 from cellplan.model.units import MM
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.joints import Axes
+from cellplan.programs.elements.joints import Axes, unit_of
 from cellplan.programs.elements.process import ProcessForm
 from cellplan.programs.promises.run_programs import moving_robots, run_programs, spoilt_by_another_order
 from cellplan.programs.promises.skew import PER_SECOND, ClockPair, RunSkew, skew_text
@@ -224,11 +224,13 @@ def _remarks(export: _Export, promise: Promise) -> Iterator[str]:
         case Promise.PACED:
             yield "on seams the tool moves at the programmed speed; times between robots are not kept"
             yield "accelerations are those of the controllers and are not judged"
+            yield from _units(export)
             yield from _processes(export)
             yield from _unwritten(cell)
             yield from _stays(export)
         case Promise.SEQUENCE_ONLY:
             yield "the controller makes the speed between rows: times and feeds of the plan are not kept"
+            yield from _units(export)
             yield from _unwritten(cell)
             yield from _stays(export)
 
@@ -238,6 +240,13 @@ def _unmet(export: _Export) -> Iterator[str]:
     others = [robot.name for robot in export.run.cell.robots if robot.name not in export.robots]
     if any(waits(export.run.cell, name) for name in others):
         yield "not to be played with programs that wait at marks: --promise sequence writes those that do"
+
+
+def _units(export: _Export) -> Iterator[str]:
+    """Robots that one program moves in step, whatever others do."""
+    for unit in dict.fromkeys(unit_of(export.run.cell, name) for name in export.robots):
+        if len(unit) > 1:
+            yield f"{' and '.join(unit)} pass the same rows at the same time, as axes of one program"
 
 
 def _unwritten(cell: Cell) -> Iterator[str]:

@@ -11,6 +11,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.report.verified_run import AnyRun, UnsolvedRun, VerifiedRun
 from cellplan.model.task.task import Frame
 from cellplan.planning.timing.schedule import TIME_DECIMALS
+from cellplan.programs.elements.joints import unit_of
 from cellplan.programs.elements.timed_rows import are_within
 from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.runs.plan.program import STILL_TOL
@@ -73,8 +74,8 @@ def run_programs(run: AnyRun) -> tuple[RunProgram, ...]:
 def spoilt_by_another_order(cell: Cell, program: RunProgram) -> Iterator[str]:
     """What another order of the robots spoils, one reason each: the first times at which it would.
 
-    While a tool is in process on the part, every holder must stand still: otherwise the path of the tool on the part
-    depends on both clocks. Two holders of one part must not move at all.
+    While a tool is in process on the part, every holder must stand still that does not move in step with it: otherwise
+    the path of the tool on the part depends on both clocks. Two holders of one part must not move at all.
     """
     holders = cell.positioners
     moves = _moves(cell, program.q, holders)
@@ -82,7 +83,7 @@ def spoilt_by_another_order(cell: Cell, program: RunProgram) -> Iterator[str]:
         yield f"{_where(program, moves)}: the holders {' and '.join(holders)} move the part: another order strains it"
     for task, inside in program.process.items():
         work = next((other for other in cell.tasks if other.name == task), None)
-        if work is None or work.relative_to is Frame.WORLD:
+        if work is None or work.relative_to is Frame.WORLD or set(holders) <= set(unit_of(cell, work.robot)):
             continue
         spoilt = moves & inside[:-1] & inside[1:]
         if spoilt.any():

@@ -12,8 +12,8 @@ from cellplan.geometry.transforms import Array, inverse, rotation_vector
 from cellplan.measures.tool_errors import error_lengths, part_poses
 from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows, Seam
 from cellplan.model.task.task import Frame, Task
-from cellplan.programs.elements.corners import LARGEST_SHARE, switches
-from cellplan.programs.elements.joints import Axes
+from cellplan.programs.elements.corners import LARGEST_SHARE, switches, units_of
+from cellplan.programs.elements.joints import Axes, in_step
 from cellplan.programs.rows.part_targets import LEFT_OVER
 from cellplan.programs.rows.rows import EssentialRows, WorkRows, times_of
 from cellplan.programs.rows.thin import bends, chosen_rows
@@ -181,16 +181,14 @@ def with_seams(
     """
     programs = []
     for program, every, phases in zip(job.programs, full, essential, strict=True):
-        robots = {
-            name: _seams_of(scene, job, (rows, every), phases.work, limits=limits, by_joints=by_joints)
-            for name, rows in program.robots.items()
-            if job.frame.promise.waits or Axes.of(job.frame.robot(name)).arm
-        }
-        if not job.frame.promise.waits:
-            (arm,) = robots.values()
-            steps = {name: _rows_in_step(scene, rows, arm) for name, rows in every.robots.items()}
-            robots = {name: robots.get(name, steps[name]) for name in program.robots}
-        programs.append(replace(program, robots=robots))
+        robots: dict[str, RobotRows] = {}
+        for unit in units_of(job.frame):
+            first = next((name for name in unit if Axes.of(job.frame.robot(name)).arm), unit[0])
+            both = program.robots[first], every
+            robots[first] = _seams_of(scene, job, both, phases.work, limits=limits, by_joints=by_joints)
+            others = (name for name in unit if name != first)
+            robots |= {name: _rows_in_step(scene, every.robots[name], robots[first]) for name in others}
+        programs.append(replace(program, robots={name: robots[name] for name in program.robots}))
     return replace(job, programs=tuple(programs))
 
 
@@ -252,17 +250,18 @@ class _SeamRows:
             process[first:last] = False
             self.rows = replace(self.rows, process=process)
 
-    def straighten(self, first: int, last: int) -> None:
-        """Leave out rows that the path of the joints does not need, whatever their times, as robots wait at marks.
+    def straighten(self, first: int, last: int, unit: Sequence[RobotRows]) -> None:
+        """Leave out rows that the path of the joints of a unit does not need, whatever their times, as robots wait.
 
         Rows stay rounded within the same distance: their shares are made smaller as segments become longer.
         """
         inside = sorted(row for row in self.chosen if first <= row <= last)
-        joints = self.scene.cell.robot(self.rows.robot).model.joints
+        joints = [joint for rows in unit for joint in self.scene.cell.robot(rows.robot).model.joints]
         within = np.array([THIN_TURN if joint.is_revolute else THIN_SLIDE for joint in joints])
+        q = np.hstack([rows.q for rows in unit])
         needed = [k for k, row in enumerate(inside) if row in self.rows.marks or switches(self.rows)[row]]
-        left = [inside[place] for place in bends(self.rows.q[inside], within, needed=needed)]
-        before, after = (_shorter(self.rows.q, rows) for rows in (inside, left))
+        left = [inside[place] for place in bends(q[inside], within, needed=needed)]
+        before, after = (_shorter(q, rows) for rows in (inside, left))
         for row in left[1:-1]:
             self.rounding[row] *= min(1.0, before[row] / max(after[row], STANDS))
         self.chosen -= set(inside) - set(left)
@@ -307,24 +306,24 @@ def _seams_of(
     for phase in work:
         first, last = phase.rows.start, min(phase.rows.stop, len(rows)) - 1
         task = next((task for task in map(phase.cell.task, phase.tasks) if task.robot == thinned.robot), None)
-        in_step = not job.frame.promise.waits
-        if task is None and not in_step:
-            state.straighten(first, last)
+        unit = in_step(job.frame, thinned.robot)
+        if task is None and job.frame.promise.waits:
+            state.straighten(first, last, [every.robots[name] for name in unit])
         elif task is not None and task.name in by_joints:
             state.switch_off(first, last)
         elif task is not None:
-            path = _path(scene, every, task, phase, limits, in_step=in_step)
+            path = _path(scene, every, task, phase, limits, unit=unit)
             state.follow(path, first, last, corners=phase.corners[task.name])
     return state.assembled()
 
 
 def _path(
-    scene: Scene, every: ProgramRows, task: Task, phase: WorkRows, limits: LineLimits, *, in_step: bool
+    scene: Scene, every: ProgramRows, task: Task, phase: WorkRows, limits: LineLimits, *, unit: Sequence[str]
 ) -> ToolPath:
-    """The path of the tool of a task in a phase."""
+    """The path of the tool of a task in a phase; robots of the unit move in step with it."""
     q = {name: rows.q[phase.rows] for name, rows in every.robots.items()}
     is_on_part = task.relative_to is Frame.PART
-    X_WP = part_poses(phase.cell, scene.chains, q if in_step else {name: one[:1] for name, one in q.items()})
+    X_WP = part_poses(phase.cell, scene.chains, q if len(unit) > 1 else {name: one[:1] for name, one in q.items()})
     X_PW = inverse(X_WP) if is_on_part else np.eye(4)
     X_PT = X_PW @ scene.chains[task.robot].tool_poses(q[task.robot])
     control = phase.cell.robot(task.robot).control
@@ -332,8 +331,8 @@ def _path(
     least = 0.0 if process is None or task.feed is None else process.off_lead_s * task.feed
     held = [
         q[name] / [MOST_HELD if joint.is_revolute else MOST_HELD_SLIDE for joint in phase.cell.robot(name).model.joints]
-        for name in every.robots
-        if in_step and name != task.robot
+        for name in unit
+        if name != task.robot
     ]
     path = ToolPath(task=task, X_PT=X_PT, most=limits.most, least=least, held=np.hstack(held) if held else None)
     return path if process is None else replace(path, smallest_zone=limits.smallest_zone)

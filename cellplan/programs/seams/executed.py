@@ -26,7 +26,7 @@ from cellplan.model.units import DEG, MM
 from cellplan.programs.elements.corners import row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.frames import controller_base, on_flange
-from cellplan.programs.elements.joints import Axes
+from cellplan.programs.elements.joints import Axes, in_step
 from cellplan.programs.elements.process import ProcessForm
 from cellplan.programs.rows.part_targets import POSE_TOL, solved_joints, tip_jacobians
 from cellplan.programs.rows.rows import times_of
@@ -67,7 +67,7 @@ class SeamExecution:
         self._robot: Robot = frame.robot(rows.robot)
         self._chain = ScrewChain(self._robot)
         self._full, self._read = full, read
-        others = () if frame.promise.waits else (name for name in read.robots if name != rows.robot)
+        others = (name for name in in_step(frame, rows.robot) if name != rows.robot)
         self._names = (rows.robot, *others)
         counts = [len(frame.robot(name).model.joints) for name in self._names]
         ends = np.cumsum([0, *counts]).tolist()

@@ -9,7 +9,7 @@ from builders.rapid_jobs import ABB, multimove_job, part_job
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cellplan.model.report.exported import ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows
 from cellplan.programs.elements.corners import may_round, row_shares
 from cellplan.programs.formats.rapid.writer import RAPID
 from cellplan.programs.formats.zones import axis_shares, axis_zones, tool_shares, tool_zones
@@ -26,9 +26,10 @@ def rows_of(name: str, **changes: object) -> RobotRows:
     return replace(rows, **changes)  # type: ignore[arg-type]
 
 
-def stops_of(*robots: RobotRows, promise: Promise = Promise.SEQUENCE_ONLY) -> list[list[int]]:
+def stops_of(*robots: RobotRows, in_step: bool = False) -> list[list[int]]:
     """Rows of each robot that may not be rounded."""
-    rounds = may_round(ProgramRows(name=None, robots={rows.robot: rows for rows in robots}), promise)
+    program = ProgramRows(name=None, robots={rows.robot: rows for rows in robots})
+    rounds = may_round(program, [list(program.robots)] if in_step else ())
     return [np.flatnonzero(~free).tolist() for free in rounds.values()]
 
 
@@ -47,11 +48,11 @@ def small_steps(*, seed: int, blend: float = 0.25) -> ExportJob:
     return replace(job, programs=(ProgramRows(name=None, robots=robots),))
 
 
-@pytest.mark.parametrize("promise", [Promise.SEQUENCE_ONLY, Promise.SYNCHRONISED])
-def test_a_row_in_process_may_be_rounded_and_a_switch_of_any_robot_not(promise: Promise) -> None:
+@pytest.mark.parametrize("in_step", [False, True])
+def test_a_row_in_process_may_be_rounded_and_a_switch_of_any_robot_not(in_step: bool) -> None:
     one, other = rows_of("one", process=process(2, 8)), rows_of("other", process=process(5, 11))
 
-    assert stops_of(one, other, promise=promise) == [[0, 2, 5, 8, 11]] * 2
+    assert stops_of(one, other, in_step=in_step) == [[0, 2, 5, 8, 11]] * 2
 
 
 def test_a_switch_of_another_robot_counts_by_its_time() -> None:
@@ -77,8 +78,8 @@ def test_robots_in_step_round_the_same_rows_and_one_that_stands_holds_up_no_othe
     idle = rows_of("idle", q=np.zeros((COUNT, 1)))
     late = rows_of("late", q=np.cumsum((np.arange(COUNT) > 6).astype(float))[:, None])  # leaves rest at row 6
 
-    assert stops_of(rows_of("one", stops=(3,)), idle, promise=Promise.SYNCHRONISED) == [[0, 3, 11]] * 2
-    assert stops_of(rows_of("one"), idle, late, promise=Promise.SYNCHRONISED) == [[0, 6, 11]] * 3
+    assert stops_of(rows_of("one", stops=(3,)), idle, in_step=True) == [[0, 3, 11]] * 2
+    assert stops_of(rows_of("one"), idle, late, in_step=True) == [[0, 6, 11]] * 3
     assert stops_of(rows_of("one"), idle)[1] == list(range(COUNT))
 
 

@@ -1,5 +1,6 @@
 """Lines and arcs of solved cells, on parts at rest and on one that a positioner turns: written, read back, judged."""
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -140,3 +141,26 @@ def test_a_ring_is_welded_while_a_positioner_turns_the_block(tmp_path: Path, mon
     assert by_joints.promised.promise is Promise.SYNCHRONISED
     assert by_joints.promised.reasons[-1] == "no lines: task 'ring': 3 mm along its seam: it cannot"
     assert not re.search("LIN|CIRC|EK", DIALECTS["krl"].render(by_joints.job)["arm.src"])
+
+
+@pytest.mark.slow
+def test_an_arm_and_its_positioner_wait_for_an_arm_of_another_controller(tmp_path: Path) -> None:
+    """The table turns under the first seam and never waits by itself; any order of both controllers is certified."""
+    shutil.copy(TABLE.with_name("ring_beside.yaml"), tmp_path / "cell.yaml")
+    assert run_command("cellplan solve cell.yaml -o run -q", tmp_path)[0] == 0
+    export = "cellplan export run --cell cell.yaml --format krl --format rapid --moves linear -o p"
+    assert run_command(export, tmp_path)[0] == 0
+    records = [json.loads((tmp_path / "p" / form / "export.json").read_text()) for form in ("krl", "rapid")]
+
+    assert [record["promise"] for record in records] == ["paced", "paced"]
+    assert records[0]["marks"][0]["certified"] == records[1]["marks"][0]["certified"]
+    pairs = [pair for stretch in records[0]["marks"][0]["certified"] for pair in stretch["pairs"]]
+    assert {tuple(pair) for pair in pairs} == {("table", "other"), ("arm", "other")}
+    source, data = ((tmp_path / "p" / "krl" / f"arm.{ending}").read_bytes().decode() for ending in ("src", "dat"))
+    turned = [float(angle) for angle in re.findall(r"E6POS ring_.*?,E1 (\S+?),", data)]
+    assert max(turned) - min(turned) > 1.0
+    assert source.count("WAIT FOR $IN[1]\r\n") == len(records[0]["marks"][0]["times_s"])
+    verify = "cellplan verify p/krl --run run --cell cell.yaml -q"
+    assert run_command(verify, tmp_path)[0] == 0
+    (tmp_path / "p" / "krl" / "arm.src").write_bytes(source.replace("WAIT FOR $IN[1]\r\n", "", 1).encode())
+    assert run_command(verify, tmp_path)[0] != 0

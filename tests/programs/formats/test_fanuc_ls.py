@@ -24,7 +24,7 @@ from cellplan.model.report.exported import ExportJob, Promise
 from cellplan.model.robot.controller import ControllerZero
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.controllers import HandshakeEntry
-from cellplan.programs.elements.corners import may_round, moves, row_shares
+from cellplan.programs.elements.corners import may_round, moves, row_shares, units_of
 from cellplan.programs.formats.fanuc_ls.writer import FANUC_LS
 
 QUANTUM = np.deg2rad(1e-4)
@@ -155,7 +155,7 @@ def test_rows_are_passed_where_no_group_stops(make) -> None:
 
     read = read_back(FANUC_LS, job)[0].robots
 
-    free = may_round(program, job.frame.promise)
+    free = may_round(program, units_of(job.frame))
     for name, rows in read.items():
         expected = free[name].copy()
         expected[[12, 19]] = False

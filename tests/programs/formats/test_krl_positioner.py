@@ -20,6 +20,7 @@ from cellplan.errors import InputError
 from cellplan.model.report.exported import ExportJob, Promise
 from cellplan.programs.elements.joints import from_numbers
 from cellplan.programs.formats.krl.writer import KRL
+from cellplan.programs.judgement.compare_rows import other_rows
 
 QUANTUM = np.deg2rad(1e-5)
 
@@ -119,3 +120,27 @@ def test_more_axes_than_a_point_holds_are_refused() -> None:
 
     with pytest.raises(InputError, match=r"robots.alpha: expected at most 6 external axes with it .*, got 7"):
         KRL.render(job_of(cell, random_program(cell), promise=Promise.SYNCHRONISED))
+
+
+def test_beside_another_arm_both_are_rounded_alike_and_the_arm_alone_waits() -> None:
+    """The table stands first in the cell, and has no signals: the arm that moves it leads."""
+    arm = replace(rail_model(), controller=zero_of(7))
+    table, alpha = controlled("table", positioner_model(), id="krc"), controlled("alpha", arm, id="krc")
+    cell = cell_of(table, alpha, controlled("beta", rail_model(), id="another"), kind="kuka")
+    job = job_of(cell, random_program(cell, marks=(0, 7, 19)), blend=0.3)
+
+    files = KRL.render(job)
+    (read,) = KRL.read(job.frame, files)
+
+    assert sorted(files) == ["alpha.dat", "alpha.src", "beta.dat", "beta.src"]
+    for robot, rows in read.robots.items():
+        assert rows.marks == (0, 7, 19)
+        assert largest_deviation(job, (read,), robot) <= 2.0 * QUANTUM
+    assert np.array_equal(read.robots["alpha"].rounding, read.robots["table"].rounding)
+    assert list(other_rows(KRL, job, (read,))) == []
+    assert [re.findall(r"\$(?:OUT|IN)\[\d+\]", files[f"{name}.src"])[1:5] for name in ("alpha", "beta")] == [
+        ["$IN[112]", "$OUT[11]", "$IN[112]", "$OUT[11]"],
+        ["$OUT[12]", "$IN[121]", "$OUT[12]", "$IN[121]"],
+    ]
+    files["alpha.dat"] = re.sub(r"(XP9=.*E2) \S+,", r"\1 0.00000,", files["alpha.dat"])
+    assert "robot 'table': row 9: expected joint tilt" in "".join(other_rows(KRL, job, KRL.read(job.frame, files)))

@@ -1,20 +1,23 @@
 """KRL of an arm and its positioner with seams: the part moves while the tool works, all axes in each point."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from builders.elbow_arm import tip
 from builders.seam_jobs import ROBOT
-from builders.seams_in_step import HELD, TABLE, job_in_step, part_at, run_in_step, shapes, table
+from builders.seams_in_step import HELD, TABLE, job_beside, job_in_step, part_at, run_in_step, shapes, table
 
-from cellplan.errors import InputError, NotVerifiedError
+from cellplan.errors import InputError, NotVerifiedError, raise_findings, refusals
 from cellplan.geometry.transforms import inverse, pose_from, rotation_from_rpy
 from cellplan.model.report.exported import ExportJob, Moves, RobotRows
+from cellplan.programs.elements.escapes import with_register
+from cellplan.programs.formats.krl.escape import KRL_ESCAPE
 from cellplan.programs.formats.krl.writer import KRL
 from cellplan.programs.judgement.compare_rows import other_rows
+from cellplan.programs.promises.run_programs import RunPhase, RunProgram, spoilt_by_another_order
 from cellplan.programs.seams.executed import executed_programs
 
 EK = "$BASE=EK(MACHINE_DEF[2].ROOT,MACHINE_DEF[2].MECH_TYPE,PART_FRAME_1)"
@@ -70,10 +73,10 @@ def executed(job: ExportJob, *, uneven: float = 0.0, is_rounded: bool = True) ->
     return program.robots
 
 
-@pytest.mark.parametrize("uneven", [0.0, 0.02])
-def test_tool_and_table_are_where_the_language_puts_them(uneven: float) -> None:
+@pytest.mark.parametrize(("make", "uneven"), [(job_in_step, 0.0), (job_in_step, 0.02), (job_beside, 0.02)])
+def test_tool_and_table_are_where_the_language_puts_them(make: Callable[[], ExportJob], uneven: float) -> None:
     """The table moves evenly with the way of the tool on the part, whatever it did in the run."""
-    job = job_in_step()
+    job = make()
     robots = executed(job, uneven=uneven)
     arm, turning = robots[ROBOT], robots[TABLE]
 
@@ -143,6 +146,48 @@ CHANGES = {
     "frame on the flange": ("alpha.dat", "PART_FRAME_1={X ", "PART_FRAME_1={X 1", "expected PART_FRAME_1 as the cell"),
     "wait": ("alpha.src", "LIN seam_1", "WAIT FOR $IN[1]\r\nLIN seam_1", "a statement that these programs have"),
 }
+
+
+def test_beside_another_controller_both_wait_for_its_arm_and_nothing_else_changes() -> None:
+    job, alone = job_beside(), KRL.render(job_in_step())
+    files = KRL.render(job)
+    (read,) = KRL.read(job.frame, files)
+
+    assert list(other_rows(KRL, job, (read,))) == []
+    assert read.robots[TABLE].marks == read.robots[ROBOT].marks == (0, 5, 7)
+    wait = "WAIT FOR $IN[101]\r\n$OUT[10]=TRUE\r\nWAIT FOR NOT $IN[101]\r\n$OUT[10]=FALSE\r\n"
+    assert files["alpha.src"].count(wait) == 3
+    assert files["alpha.src"].replace(wait, "").replace("$OUT[10]=FALSE\r\n", "") == alone["alpha.src"]
+    assert files["alpha.dat"] == alone["alpha.dat"]
+    without = KRL.read(job.frame, files | {"alpha.src": files["alpha.src"].replace(wait, "", 1)})
+    assert "expected waits at rows [0, 5, 7], read [5, 7]" in "".join(other_rows(KRL, job, without))
+
+
+def test_the_part_may_move_under_a_tool_that_moves_in_step_and_under_no_other() -> None:
+    job = job_beside()
+    cell, rows = job.frame.cell, run_in_step(job)
+    times = rows.robots[ROBOT].times
+    assert times is not None
+    q = np.hstack([rows.robots[TABLE].q, rows.robots[ROBOT].q, np.zeros((len(times), 6))])
+    phase = RunPhase(name="work", place=0, first=0, last=len(times) - 1)
+    inside = (times > 1.5) & (times < 5.5)
+    program = RunProgram(name=None, times=times, q=q, phases=(phase,), process={cell.tasks[0].name: inside})
+
+    assert list(spoilt_by_another_order(cell, program)) == []
+    of_other = replace(cell, tasks=(replace(cell.tasks[0], robot="beta"),))
+    assert "the part moves while the tool of 'beta' is in process" in next(spoilt_by_another_order(of_other, program))
+
+
+@pytest.mark.parametrize(
+    ("form", "words"), [("arm", "--robot: expected 'table' too"), ("escape", "--escape: expected")]
+)
+def test_an_arm_without_its_positioner_and_escapes_of_both_are_refused(form: str, words: str) -> None:
+    job = job_beside()
+    frame = replace(job.frame, robots=(ROBOT,)) if form == "arm" else job.frame
+    dialect = KRL if form == "arm" else with_register(KRL, KRL_ESCAPE)
+
+    with pytest.raises(InputError, match=words):
+        raise_findings(refusals(*dialect.demands(frame, 0)))
 
 
 @pytest.mark.parametrize("name", CHANGES)

@@ -9,23 +9,20 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.model.report.exported import ExportFrame, Moves, Promise
 from cellplan.programs.elements.frames import require_rest
-from cellplan.programs.elements.joints import Axes
+from cellplan.programs.elements.joints import Axes, unit_of
 from cellplan.programs.elements.pages import require_six_axes
 from cellplan.programs.formats.krl.poses import status_and_turn
 from cellplan.programs.formats.krl.text import EXTERNAL, require_numbers
 
 
 def played_robots(frame: ExportFrame) -> ExportFrame:
-    """The frame with the robots that have programs of their own: in step, arms alone."""
-    if frame.promise is not Promise.SYNCHRONISED:
-        return frame
-    return replace(frame, robots=tuple(name for name in frame.robots if Axes.of(frame.robot(name)).arm))
+    """The frame with the robots that have programs of their own: no positioners that move with an arm."""
+    return replace(frame, robots=tuple(name for name in frame.robots if name == unit_of(frame.cell, name)[0]))
 
 
 def moved_robots(frame: ExportFrame, robot: str) -> tuple[str, ...]:
-    """Robots whose axes stand in the points of a robot's program: itself first, in step all others too."""
-    others = [name for name in frame.robots if name != robot]
-    return (robot, *others) if frame.promise is Promise.SYNCHRONISED else (robot,)
+    """Robots whose axes stand in the points of a robot's program: itself first."""
+    return unit_of(frame.cell, robot)
 
 
 def order_of_axes(frame: ExportFrame, robot: str) -> list[int]:
@@ -46,10 +43,11 @@ def demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
         yield partial(require_numbers, frame, robot)
         yield partial(require_six_axes, frame.robot(robot), external=EXTERNAL, what="KRL")
         yield partial(_require_places, frame, robot)
-        in_step = frame.promise is Promise.SYNCHRONISED
-        for station in frame.stations.get(robot, ()) if not in_step else ():
-            yield partial(require_rest, robot, station)
-        if frame.promise is Promise.PACED or (in_step and frame.moves is not Moves.JOINTS):
+        for station in frame.stations.get(robot, ()):
+            if station.holder not in moved_robots(frame, robot):
+                yield partial(require_rest, robot, station)
+        is_in_step = frame.promise is Promise.SYNCHRONISED and frame.moves is not Moves.JOINTS
+        if frame.promise is Promise.PACED or is_in_step:
             placed = frame.robot(robot)
             yield partial(status_and_turn, placed, np.zeros((1, len(placed.model.joints))))
             for grasp in frame.cell.part.held_by[:1]:
@@ -69,7 +67,10 @@ def machine_of(frame: ExportFrame, positioner: str) -> int:
 
 
 def _require_places(frame: ExportFrame, arm: str) -> None:
-    """Refuse more external axes than a point holds."""
+    """Refuse more external axes than a point holds, and an arm without the positioners that its points move."""
+    for name in moved_robots(frame, arm):
+        if name not in frame.robots:
+            raise InputError(f"--robot: expected '{name}' too, whose axes stand in the points of '{arm}', got none")
     count = external_axes(frame, arm)
     if count > EXTERNAL:
         raise InputError(

@@ -318,7 +318,8 @@ class _Player:
             order = order_of_axes(self.frame, name)
             numbers = np.zeros((len(written), len(order)))
             numbers[:, order] = written[:, first : first + len(order)]
-            robots.append(RobotRows(robot=name, q=from_numbers(self.frame.robot(name), numbers), rounding=arm.rounding))
+            q = from_numbers(self.frame.robot(name), numbers)
+            robots.append(RobotRows(robot=name, q=q, rounding=arm.rounding, marks=arm.marks))
             first += len(order)
         return tuple(robots)
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import chain
 from math import floor
 from typing import Final
@@ -20,7 +19,7 @@ from cellplan.programs.elements.pages import (
     paged,
     percentages,
     program_paths,
-    render_programs,
+    require_rows,
     shares_as_written,
 )
 from cellplan.programs.elements.text import comment, joined
@@ -46,10 +45,9 @@ def render_krl(job: ExportJob) -> dict[str, str]:
     """
     raise_findings(refusals(*demands(job.frame, 0)))
     paths, files = _paths(job.frame), dict[str, str]()
-    if job.frame.promise is Promise.SEQUENCE_ONLY:
-        return render_programs(job, KRL, paths, partial(_files, job.frame))
     by_name = {program.name: program for program in job.programs}
     for (name, robot), path in paths.items():
+        require_rows(job, by_name[name])
         program = _moved_together(job, by_name[name], moved_robots(job.frame, robot), path)
         files |= _with_seams(job, by_name[name], program) if KRL.has_seams(job.frame) else _modules(program)
     return files
@@ -79,16 +77,13 @@ def _with_seams(job: ExportJob, program: ProgramRows, part: PagedProgram) -> dic
     return {f"{path}.src": joined(source, line_end=LINE_END), f"{path}.dat": joined(data, line_end=LINE_END)}
 
 
-def _files(frame: ExportFrame, program: PagedProgram) -> dict[str, str]:
-    """The files of a robot by itself."""
-    return _modules(replace(program, numbers=program.numbers[:, order_of_axes(frame, program.placed.name)]))
-
-
 def _moved_together(job: ExportJob, program: ProgramRows, robots: Sequence[str], path: str) -> PagedProgram:
     """What is written of an arm, and of positioners that move in step: each row is a point of all their axes."""
     parts = [paged(job, KRL, program, robot, path) for robot in robots]
-    shares = row_shares(job, program)
     numbers = np.hstack([part.numbers[:, order_of_axes(job.frame, part.placed.name)] for part in parts])
+    if len(parts) == 1:
+        return replace(parts[0], numbers=numbers)
+    shares = row_shares(job, program)
     whole = np.minimum.reduce(
         [np.where(np.any(moves(part.rows), axis=0), shares[part.placed.name], LARGEST_SHARE) for part in parts]
     )

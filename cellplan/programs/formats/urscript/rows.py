@@ -7,7 +7,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.acceleration import full_speed_in
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ProgramRows, Promise, RobotRows
+from cellplan.model.report.exported import ProgramRows, RobotRows
 from cellplan.programs.elements.corners import may_round
 from cellplan.programs.formats.zones import tool_zones
 
@@ -65,5 +65,5 @@ def blend_radii(robot: Robot, rows: RobotRows, blend: Array | float) -> Array:
         return np.zeros(len(rows))
     radii = tool_zones(robot, rows.q, np.broadcast_to(blend, len(rows)))
     radii = np.floor(BLEND_SHARE * radii / BLEND_TICK) * BLEND_TICK
-    free = may_round(ProgramRows(name=None, robots={robot.name: rows}), Promise.SEQUENCE_ONLY)[robot.name]
+    free = may_round(ProgramRows(name=None, robots={robot.name: rows}))[robot.name]
     return np.where(free & (radii >= SMALLEST_BLEND), radii, 0.0)
