@@ -202,7 +202,7 @@ def _require_one_program(frame: ExportFrame) -> None:
             f"robots.{group[0]}.controller.handshake: expected the inputs that {', '.join(map(repr, group[1:]))} set, "
             "as escape programs ask one another by wires, got none"
         )
-    for arm, *others in (unit_of(frame.cell, name) for name in frame.robots):
+    for arm, *others in (unit_of(frame.cell, robot.name) for robot in frame.cell.robots):
         if others:
             raise InputError(f"--escape: expected arms that move no positioner, got '{others[0]}' in step with '{arm}'")
 
