@@ -13,7 +13,7 @@ from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows
 from cellplan.model.units import DEG, MM
 from cellplan.programs.elements.corners import moves, row_shares
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.joints import Angle, from_numbers, to_numbers
+from cellplan.programs.elements.joints import Angle, from_numbers, in_step, to_numbers
 from cellplan.programs.elements.timed_rows import decimals_of
 
 TIME_ROUNDING: Final = 0.5e-3  # [s] formats write times with three decimals or more
@@ -142,7 +142,7 @@ def _other_speed(dialect: Dialect, job: ExportJob, written: ProgramRows, read: R
     """The first row to which the joints do not move as fast as written; in step all robots move as the fastest one."""
     if dialect.speeds is None or read.speeds is None:
         return None
-    names = [read.robot] if job.frame.promise.waits else job.frame.robots
+    names = in_step(job.frame, read.robot)
     expected = np.max([dialect.speeds(job.frame.robot(name), written.robots[name]) for name in names], axis=0)
     off = np.abs(read.speeds - expected) > FEED_TOL
     if not np.any(off):
