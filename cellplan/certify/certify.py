@@ -49,7 +49,6 @@ def certify(
             that does not keep its demand, and only ``Bound.is_met`` of the result is valid.
         with_curves: Whether the bounds of each class are then raised in every block, to be drawn; the verdict and the
             smallest distances are known before.
-        arms: The lever arms of the cell over the motion, where they are known.
     """
     survey, arms = Survey(scene, q), arms or LeverArms(scene, q)
     for first, last in _stretches(survey):

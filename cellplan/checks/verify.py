@@ -68,12 +68,10 @@ def verify(
     The kinematics is that of successive screw displacements; nothing of the planner is used.
 
     Args:
-        scene: The cell made computable.
         schedule: Desired tool poses at every sample.
         tables: One joint table per robot, parsed from its text.
         moving: Names of the robots that may move; the others must stand still.
         idle: Names of the robots that must be at their homes; None for those without a task, unless they may move.
-        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: A table is missing, or does not fit the cell or the clock.
@@ -140,11 +138,7 @@ def verify_motion(
 def with_clearance(
     report: Report, scene: Scene, schedule: Schedule, *, is_reported: bool = True, progress: Progress = silent
 ) -> Report:
-    """The report of ``verify_motion``, completed by the clearance of all bodies and the depth of mounted ones.
-
-    Args:
-        is_reported: See ``with_clocks``.
-    """
+    """The report of ``verify_motion``, completed by the clearance of all bodies and the depth of mounted ones."""
     q = stacked_positions(scene.cell, report.q)
     completed_report = completed(report, run_clearance(scene, schedule, q, progress=progress))
     return with_clocks(completed_report, scene, schedule, is_reported=is_reported, progress=progress)

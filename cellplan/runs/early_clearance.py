@@ -28,7 +28,6 @@ class EarlyClearance:
         Args:
             begin: Begins a function with its arguments in another process and returns what waits for its value; None
                 where all is done here.
-            with_curves: Whether the distances over time are worked out sharply enough to be drawn.
         """
         self.with_curves, self._begin = with_curves, begin
         self._clearance = run_clearance if with_curves else without_curves

@@ -95,7 +95,6 @@ def band(
         low: Smallest difference in [s].
         first: Both times are no less than this.
         last: Both times are no more than this.
-        parts: Rectangles across the band.
 
     Returns:
         Rectangles, see ``ClockRegion``, shape (R, 4). They reach beyond the band by less than this share of its width

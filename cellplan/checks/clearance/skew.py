@@ -33,11 +33,7 @@ STAGE = "searching the allowed skew"
 def allowed_skew(
     scene: Scene, schedule: Schedule, q: RobotRows, depths: tuple[ToolDepth, ...], *, progress: Progress = silent
 ) -> SkewReport:
-    """How far the clocks of a run may be apart.
-
-    Args:
-        depths: Largest depth of each tool on one clock, see ``tool_depths``.
-    """
+    """How far the clocks of a run may be apart."""
     cell, times = scene.cell, schedule.times
     tools = tuple(_tools(scene, schedule, q, depths))
     moving, pairs = FreeMotion(scene, q), list(_apart(cell))

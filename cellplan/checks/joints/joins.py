@@ -49,7 +49,6 @@ def with_joins(cell: Cell, reports: Sequence[Report]) -> list[Report]:
 
     Args:
         cell: The cell of the whole program; reports of any other program stay as they are.
-        reports: Reports of the phases of one cycle in their order.
     """
     if not cell.program.is_home_to_home:
         return list(reports)

@@ -29,7 +29,6 @@ def check_between_rows(
     """The errors of all tasks and closures with those between the rows, where the schedule knows what is desired there.
 
     Args:
-        schedule: Where every tool must be.
         off: By how much each tool, those of the tasks first, may be off besides at the rows in [m] and [rad], shape
             (N, 2) each; between two rows by no more than the value between both. None for nothing.
     """

@@ -31,7 +31,6 @@ def conditioning(
 
     Args:
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
-        moving: Names of the robots that may move.
     """
     count = len(schedule.times)
     part_frames: Array = np.broadcast_to(X_WP, (count, 4, 4))

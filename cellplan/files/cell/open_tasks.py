@@ -14,9 +14,6 @@ def open_tasks(root: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     """The robots that may do each open task: those that are listed, or all that are available and hold no part.
 
     A task of a robot that is not available is open too.
-
-    Args:
-        root: The values of a cell file as they stand in it.
     """
     tasks, robots = root.get("tasks"), root.get("robots")
     if not isinstance(tasks, Mapping) or not isinstance(robots, Mapping):

@@ -143,11 +143,7 @@ def layout_record(
     tried: Mapping[int, CandidateResult],
     best: CandidateResult | None,
 ) -> LayoutRecord:
-    """The search in printed units.
-
-    Args:
-        tried: What came of those that were solved in full, by number.
-    """
+    """The search in printed units."""
     request, cell = ready.request, ready.cell
     listed = list(_candidates(ready, finished, tried))
     standing = best.standing if best else None if ready.unled else standing_of_given(ready)

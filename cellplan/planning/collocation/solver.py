@@ -98,7 +98,6 @@ class Collocation:
         """Carry cells through windows, refined where that is needed; returns those that came to the end.
 
         Args:
-            windows: Windows in order.
             q: Configurations of all cells, shape (nq, all cells); those of the cells are carried on in place.
             record: Called with every window that cells passed, in order for each of them.
         """

@@ -148,11 +148,7 @@ class Retimer:
     errors: StepTolerance | None = None
 
     def fastest(self, path: JointPath) -> RetimedPath:
-        """The fastest motion found along a path.
-
-        Args:
-            path: The joints over the nominal time.
-        """
+        """The fastest motion found along a path."""
         made: list[tuple[int, TimedRows]] = []
         rest = 0.0
         for piece in stretches(path, self.bounds.velocity):

@@ -105,7 +105,6 @@ def legs_of(query: TransferQuery, retimer: Retimer, tried: Tried, moves: Straigh
     """Stacked configurations at the ends of the legs of the fastest free move, shape (nq,) each; none where none is.
 
     Args:
-        query: Who moves from where to where.
         retimer: The limits of all joints and the step of the rows.
         tried: Receives the legs that were refused.
         moves: Verdicts on straight moves in the scene of the query.
@@ -134,7 +133,6 @@ def least_steps(query: TransferQuery, retimer: Retimer, refused: Mapping[str, En
     """Steps that a move in legs takes at least where some robots cannot go straight at once.
 
     Args:
-        query: Who moves from where to where.
         retimer: The limits of all joints and the step of the rows.
         refused: Ends of the move of those robots.
     """

@@ -76,7 +76,6 @@ def plan_transfer(query: TransferQuery, *, retimer: Retimer, progress: Progress 
     the rows are certified with all pairs of the scene.
 
     Args:
-        query: From where to where, in the scene of the phase.
         retimer: The limits of all joints and the step of the rows.
 
     Raises:

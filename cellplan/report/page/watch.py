@@ -15,12 +15,7 @@ RELOAD_MESSAGE: Final = "cellplan:reload"  # asks a page in a frame to load itse
 
 
 def watch_page(title: str, *, pages: Sequence[tuple[str, str]], state: str) -> str:
-    """The page as text.
-
-    Args:
-        pages: Titles and file names of the pages of a run.
-        state: File name of the script that ``state_script`` returns.
-    """
+    """The page as text."""
     return template("watch.html").render(title=title, pages=pages, state=state, mark=MARK, message=RELOAD_MESSAGE)
 
 

@@ -40,9 +40,6 @@ def find_homes(
     in which its robot is idle. One robot after another is placed, in the order of their names; one that finds no extra
     comes before the others in the next try.
 
-    Args:
-        scene: The scene of the cell, every start posture filled in.
-
     Raises:
         HomeNotFoundError: A robot has no such place.
     """
@@ -101,11 +98,7 @@ class _HomeSearch:
     """The search for the home of one robot."""
 
     def __init__(self, scene: Scene, runs: Sequence[PlannedRun], robot: Robot) -> None:
-        """Look up the runs in which the robot is idle.
-
-        Args:
-            scene: The scene of the cell, with all homes that are known so far.
-        """
+        """Look up the runs in which the robot is idle."""
         self._cell, self._robot, self._chain = scene.cell, robot, scene.chains[robot.name]
         self._runs = [_idle_run(scene, run, robot.name) for run in runs if robot.name in run.phase.idle]
         picked = [np.unique(np.linspace(0, len(run.q) - 1, TRIED_SAMPLES).astype(int)) for run in self._runs]

@@ -39,11 +39,7 @@ class ProgramClock:
 
     @classmethod
     def of(cls, cell: Cell, plan: Plan, schedules: Sequence[Schedule]) -> Self:
-        """Put the phases of a program one after the other.
-
-        Args:
-            plan: The plan, on no clock yet.
-        """
+        """Put the phases of a program one after the other."""
         steps = [len(schedule.times) - 1 for schedule in schedules]
         first = np.cumsum([0, *(count + gap for count, gap in zip(steps, _gap_steps(plan), strict=True))]).tolist()
         times = np.round(np.arange(first[-1] + 1) * cell.motion.step, TIME_DECIMALS)
@@ -105,11 +101,7 @@ class ProgramClock:
         return np.concatenate([stacked[1:] if skip else stacked for stacked, skip in zip(rows, shared, strict=True)])
 
     def table(self, tasks: Sequence[str]) -> ClockTable:
-        """What happens at each row.
-
-        Args:
-            tasks: Names of the tasks in the order of the columns.
-        """
+        """What happens at each row."""
         names = [""] * len(self.times)
         lengths = {task: np.zeros(len(self.times)) for task in tasks}
         for phase, schedule in zip(self.plan.program, self.schedules, strict=True):

@@ -36,9 +36,6 @@ def retimed(
 ) -> tuple[ProgramClock, list[Motion]]:
     """A program and the motions of its phases on the clock that the cell's timing asks for.
 
-    Args:
-        motions: Motion of each of its phases as their time laws have them.
-
     Returns:
         The same objects where the program runs as it is written.
 

@@ -42,7 +42,6 @@ def plan_run(cell: Cell, paths: Mapping[str, ClockedPath], phase: Phase, *, prog
 
     Args:
         cell: The cell, every start posture filled in.
-        paths: Path of every task on the common clock, by task name.
 
     Raises:
         NoSolutionError: A tool lost its path.

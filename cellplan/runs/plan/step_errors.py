@@ -23,11 +23,7 @@ class StepErrors:
     """Errors of all tools in steps along a joint path, in which the joints move linearly."""
 
     def __init__(self, scene: Scene, paths: Sequence[ClockedPath], path: JointPath) -> None:
-        """Take the bend of the joint path once.
-
-        Args:
-            path: The joints over the nominal time.
-        """
+        """Take the bend of the joint path once."""
         self._scene, self._paths, self._path = scene, tuple(paths), path
         half = min(HALF_STEP, 0.25 * path.end)
         self._at = np.linspace(half, path.end - half, POINTS + 1)

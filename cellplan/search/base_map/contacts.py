@@ -29,7 +29,6 @@ def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool 
     Args:
         X_WB: Its base for each motion, shape (K, 4, 4).
         q: The motions, shape (K, N, nq).
-        standing: Whether what stands there is judged too, by its depth.
     """
     if stands_by_link(scene.cell, robot) and len(q) > 1:  # its pairs depend on where it stands
         slices = (slice(k, k + 1) for k in range(len(q)))

@@ -17,11 +17,7 @@ Edge = tuple[str, str, KeyPath | None]  # a task, one that is done before it, an
 def task_rule_findings(
     valid: ValidEntries, document: YamlDocument, robots: Mapping[str, Sequence[str]]
 ) -> Iterator[Finding]:
-    """Everything about these rules that contradicts other entries.
-
-    Args:
-        robots: Robots that may do each task which is open to several.
-    """
+    """Everything about these rules that contradicts other entries."""
     program, known = valid.program, valid.names["tasks"]
     if program is None:
         return

@@ -40,7 +40,6 @@ def deepest_point(
     measured.
 
     Args:
-        guest: The solid whose surface is measured.
         host: The solid it is in; a mesh that is not closed has no inside.
         R_HG: Rotation of the guest in the host, shape (3, 3).
         p_HG: Its position in [m], shape (3,).
