@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from cellplan.checks.clearance.check import UNKNOWN, check_clearance
-from cellplan.checks.clearance.idle import check_idle
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.checks.clearance.skew import allowed_skew, has_clocks
 from cellplan.checks.clearance.standoff import check_standoffs
@@ -18,8 +17,7 @@ from cellplan.checks.joints.drift import check_joint_drift, repeatability
 from cellplan.checks.joints.limits import check_joints, check_shown, check_sums
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.joints.payload import check_payload, load_uses
-from cellplan.checks.joints.transfer_speeds import check_transfer_speeds
-from cellplan.checks.tools.arcs import check_arcs
+from cellplan.checks.joints.transfer_speeds import check_idle, check_transfer_speeds
 from cellplan.checks.tools.between_checks import (
     check_between_rows,
     check_closures_between,
@@ -29,7 +27,7 @@ from cellplan.checks.tools.between_checks import (
 from cellplan.checks.tools.conditioning import conditioning
 from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
 from cellplan.checks.tools.tracking import check_accuracy, check_closure
-from cellplan.checks.tools.weld_position import check_weld_positions
+from cellplan.checks.tools.weld_position import check_arcs, check_weld_positions
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.measures.joint_use import joint_uses

@@ -13,9 +13,9 @@ from cellplan.model.units import MM
 from cellplan.scene.bodies import SceneBody, part_body
 from cellplan.scene.collision.bodies import BodyPoses, CollisionBody, prepare
 from cellplan.scene.collision.engine import Engine
+from cellplan.scene.collision.overlap.contact_zone import outside_grip
 from cellplan.scene.collision.overlap.containment import is_inside
 from cellplan.scene.collision.overlap.depth import overlap_depth
-from cellplan.scene.collision.overlap.grip_zone import outside_grip
 from cellplan.scene.pairs import Rule
 
 GRIP_TOL: Final = 1e-4  # [m] by which the face of a grip may lie deeper than the grip: what counts there is its depth

@@ -19,7 +19,7 @@ from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody
 from cellplan.scene.collision.bodies import CollisionBody, prepare
 from cellplan.scene.collision.engine import Engine
-from cellplan.scene.collision.overlap.grip_zone import outside_grip
+from cellplan.scene.collision.overlap.contact_zone import outside_grip
 from cellplan.scene.grips import GRIP_TOL
 from cellplan.scene.mounting import Mount, MountedPair, is_rigid_with_flange
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, StraightMotion

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from builders.uncertified import uncertified
 
-from cellplan.checks.joints.via_points import with_via_points
+from cellplan.checks.joints.joins import with_via_points
 from cellplan.files.cell.load import load_cell
 from cellplan.model.report.report import Check
 from cellplan.model.settings.program import OrderEntry, ProgramEntry

@@ -1,6 +1,7 @@
 """The page beside a run folder that shows its latest result while the cell is watched."""
 
 import contextlib
+import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,8 +10,10 @@ from urllib.parse import quote
 
 from cellplan.errors import InputError
 from cellplan.files.run.whole_file import write_whole
-from cellplan.report.page.watch import MARK, state_script, watch_page
+from cellplan.report.page.render import template
 
+MARK: Final = '<meta name="generator" content="cellplan watch">'  # stands in the first lines of every such page
+RELOAD_MESSAGE: Final = "cellplan:reload"  # asks a page in a frame to load itself again, at its place and instant
 MARK_WITHIN: Final = 400  # [bytes]
 
 
@@ -59,3 +62,21 @@ def _begin(path: Path) -> str:
             return file.read(MARK_WITHIN).decode("utf-8", "replace")
     except OSError:
         return ""
+
+
+def watch_page(title: str, *, pages: Sequence[tuple[str, str]], state: str) -> str:
+    """The page as text."""
+    return template("watch.html").render(title=title, pages=pages, state=state, mark=MARK, message=RELOAD_MESSAGE)
+
+
+def state_script(*, number: int, run: str, phase: str, lines: Sequence[str]) -> str:
+    """The script that tells the page what came of the last round.
+
+    Args:
+        number: Number of the results so far; the pages are loaded again when it changes.
+        run: Where the run folder lies from the page, as a part of its address.
+        phase: One of working, passed, failed and error.
+        lines: What to say about it.
+    """
+    state = {"number": number, "run": run, "phase": phase, "lines": list(lines)}
+    return f"cellplanState({json.dumps(state)});\n"

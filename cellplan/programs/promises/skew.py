@@ -7,8 +7,8 @@ from typing import Final
 from cellplan.checks.clearance.skew import has_clocks
 from cellplan.model.report.skew import MOST_SKEW, PairSkew
 from cellplan.model.report.verified_run import VerifiedRun
-from cellplan.report.text.skew import demand_text
-from cellplan.report.text.skew import skew_text as report_text
+from cellplan.report.text.notes import demand_text
+from cellplan.report.text.notes import skew_text as report_text
 
 PER_SECOND: Final = 1e3  # [ms/s]
 

@@ -15,8 +15,7 @@ from cellplan.report.record.phases import instant_text
 from cellplan.report.record.sections.clearance import other_classes
 from cellplan.report.text.columns import Row, aligned
 from cellplan.report.text.method import DEFAULT_METHOD, moved_start_lines, no_accurate_mode
-from cellplan.report.text.notes import accuracy_note, clock_note, grip_notes, open_surface_notes
-from cellplan.report.text.skew import skew_row
+from cellplan.report.text.notes import accuracy_note, clock_note, grip_notes, open_surface_notes, skew_row
 
 MOST_OF_A_GROUP: Final = 8  # [-] failed checks that are shown; further ones are counted
 

@@ -19,7 +19,7 @@ from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.task.task import Frame
-from cellplan.report.text.skew import skew_notes
+from cellplan.report.text.notes import skew_notes
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 

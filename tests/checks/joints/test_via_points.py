@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cellplan.checks.joints.via_points import with_via_points
+from cellplan.checks.joints.joins import with_via_points
 from cellplan.errors import InputError
 from cellplan.files.cell.load import load_cell
 from cellplan.files.cell.write import render_cell

@@ -7,10 +7,10 @@ import pytest
 import trimesh
 
 from cellplan import load_cell
-from cellplan.files.cell.visuals import robot_visuals
-from cellplan.files.robots.urdf.load import UrdfOptions
 from cellplan.files.robots.urdf.visuals import read_visuals
+from cellplan.files.robots.urdf.load import UrdfOptions
 from cellplan.geometry.shapes import Box, Mesh
+from cellplan.jobs.view.geometries import robot_visuals
 from cellplan.jobs.view.write import ViewRequest, view
 
 LINK = '<link name="{name}">{visual}<collision><geometry><box size="0.3 0.3 0.1"/></geometry></collision></link>'

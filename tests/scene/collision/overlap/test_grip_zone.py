@@ -5,7 +5,7 @@ import pytest
 
 from cellplan.geometry.shapes import Box, Cylinder, Mesh
 from cellplan.geometry.transforms import pose
-from cellplan.scene.collision.overlap.grip_zone import outside_grip
+from cellplan.scene.collision.overlap.contact_zone import outside_grip
 
 TIP = pose((0.0, 0.0, 0.05))  # the tip in the middle of the front face of a solid of 0.1 m
 

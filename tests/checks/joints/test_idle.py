@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders.scene_builders import arm_model, make_cell, placed, schedule, slide_model, work
 
-from cellplan.checks.clearance.idle import check_idle
+from cellplan.checks.joints.transfer_speeds import check_idle
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Cell
