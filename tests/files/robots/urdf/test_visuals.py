@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from cellplan import load_cell
-from cellplan.files.robots.urdf.visuals import read_visuals
 from cellplan.files.robots.urdf.load import UrdfOptions
+from cellplan.files.robots.urdf.visuals import read_visuals
 from cellplan.geometry.shapes import Box, Mesh
 from cellplan.jobs.view.geometries import robot_visuals
 from cellplan.jobs.view.write import ViewRequest, view
