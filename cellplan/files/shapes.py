@@ -37,8 +37,7 @@ def direction(written: str | tuple[float, float, float]) -> Array:
         vector = np.zeros(3)
         vector["xyz".index(written[-1])] = -1.0 if written.startswith("-") else 1.0
         return vector
-    unit: Array = np.array(written) / np.linalg.norm(written)
-    return unit
+    return np.array(written) / np.linalg.norm(written)
 
 
 def centred_solid(entry: PartShapeEntry | SolidEntry, read_mesh: MeshReader) -> tuple[Solid, Array]:

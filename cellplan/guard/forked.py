@@ -63,8 +63,7 @@ class ForkedWork:
         def result() -> Value:
             if process in self._running:
                 with suppress(EOFError, OSError, pickle.UnpicklingError):
-                    value: Value = self._read(process)
-                    return value
+                    return self._read(process)
             return function(*arguments, progress=self._progress)
 
         return result

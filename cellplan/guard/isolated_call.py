@@ -23,8 +23,7 @@ def in_child(function: Callable[..., Value], *arguments: object, guard: Guard) -
     """
     with _lock:
         answer = _child().ask(job_here(function, arguments, guard), guard)
-    value: Value = value_of(answer, guard)
-    return value
+    return value_of(answer, guard)
 
 
 def value_of(answer: Answer, guard: Guard) -> Any:

@@ -98,8 +98,7 @@ class ChildProcess:
             self._has_path = True
         pickle.dump(job, self._process.stdin)
         self._process.stdin.flush()
-        answer: Answer = pickle.load(self._process.stdout)  # noqa: S301 - written by our own child
-        return answer
+        return pickle.load(self._process.stdout)  # noqa: S301 - written by our own child
 
     def _end_late(self, late: threading.Event) -> None:
         """End a process that takes too long."""

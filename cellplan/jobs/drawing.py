@@ -50,8 +50,7 @@ def footprint(shape: Box | Cylinder, X_WS: Array) -> list[list[float]]:
     """Outline in [mm] from above of an upright box or cylinder at a pose in the world, shape (4, 4)."""
     corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     points = 0.5 * corners * np.array(shape.size[:2]) if isinstance(shape, Box) else shape.radius * AROUND[:, :2]
-    outline: list[list[float]] = _rounded(points @ X_WS[:2, :2].T + X_WS[:2, 3])
-    return outline
+    return _rounded(points @ X_WS[:2, :2].T + X_WS[:2, 3])
 
 
 def swept_area(scene: Scene, q: Array) -> dict[str, Any]:

@@ -35,5 +35,4 @@ def distances(points: Array, path: Array) -> Array:
     lengths = np.maximum((sides**2).sum(axis=1), np.finfo(float).tiny)
     from_begin = points[:, None] - path[None, :-1]
     shares = np.clip((from_begin * sides).sum(axis=2) / lengths, 0.0, 1.0)
-    nearest: Array = np.linalg.norm(from_begin - shares[..., None] * sides, axis=2).min(axis=1)
-    return nearest
+    return np.linalg.norm(from_begin - shares[..., None] * sides, axis=2).min(axis=1)

@@ -79,8 +79,7 @@ class Cluster(Executor):
         outer: Future[Any] = Future()
 
         def call() -> Future[Any]:
-            sent: Future[Any] = self._dask.submit(checked, _versions(), self._files(), function, *arguments, **named)
-            return sent
+            return self._dask.submit(checked, _versions(), self._files(), function, *arguments, **named)
 
         self._send(outer, call)
         return outer

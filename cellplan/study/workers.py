@@ -121,8 +121,7 @@ def _use(children: ChildStock) -> None:
 
 
 def _children() -> ChildStock:
-    children: ChildStock = getattr(_thread, "children", CHILDREN)
-    return children
+    return getattr(_thread, "children", CHILDREN)
 
 
 def packed(evaluate: Evaluate) -> bytes:

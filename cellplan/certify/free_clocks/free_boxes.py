@@ -100,8 +100,7 @@ class BoxBounds:
 
     def _along(self, bodies: Indices, R: Array, p: Array, n: Array) -> Array:
         """How far some bodies reach along unit directions from the origin of the world in [m], shape (M,)."""
-        reach: Array = np.einsum("mi,mi->m", n, p) + self._supports.reach(bodies, _turned(np.swapaxes(R, 1, 2), n))
-        return reach
+        return np.einsum("mi,mi->m", n, p) + self._supports.reach(bodies, _turned(np.swapaxes(R, 1, 2), n))
 
     def read(self, boxes: Boxes, goals: Array) -> tuple[Boxes, list[Reading]]:
         """Ask the engine in the middle of each box; exactly, where the hulls do not reach a goal in [m], shape (M,)."""
@@ -199,8 +198,7 @@ def is_below(reading: Reading, goal: float) -> bool:
 
 def _turned(R: Array, vectors: Array) -> Array:
     """Each vector turned by its own rotation, shape (M, 3)."""
-    rotated: Array = (R @ vectors[..., None])[..., 0]
-    return rotated
+    return (R @ vectors[..., None])[..., 0]
 
 
 def _unit(direction: Array) -> Array:

@@ -54,14 +54,12 @@ class FreeMotion:
         """Way in [m] of some bodies from the first row to some places of their programs, shape (M,)."""
         before = np.clip(rows.astype(np.intp), 0, self._travel.shape[1] - 2)
         begin = self._travel[bodies, before]
-        travelled: Array = begin + (rows - before) * (self._travel[bodies, before + 1] - begin)
-        return travelled
+        return begin + (rows - before) * (self._travel[bodies, before + 1] - begin)
 
     def stray(self, bodies: Indices, first: Array, last: Array) -> Array:
         """How far in [m] a point of some bodies is at most from its chord between two places, shape (M,)."""
         begin, end = np.floor(first).astype(np.intp), np.ceil(last).astype(np.intp)
-        deviation: Array = 0.25 * (last - first) * (self._swerves[bodies, end] - self._swerves[bodies, begin])
-        return deviation
+        return 0.25 * (last - first) * (self._swerves[bodies, end] - self._swerves[bodies, begin])
 
     def poses(self, bodies: Indices, rows: Array) -> tuple[Array, Array]:
         """Rotations, shape (M, 3, 3), and positions in the world in [m], shape (M, 3), of some bodies.
@@ -86,8 +84,7 @@ class FreeMotion:
         q = self._q[robot]
         before = np.clip(rows.astype(np.intp), 0, len(q) - 2)
         share = (rows - before)[:, None]
-        interpolated: Array = (1.0 - share) * q[before] + share * q[before + 1]
-        return interpolated
+        return (1.0 - share) * q[before] + share * q[before + 1]
 
     def _worked_out(self) -> tuple[Array, Array]:
         """Ways and swerves of all bodies at the rows of the longest program; nothing moves after its last row.

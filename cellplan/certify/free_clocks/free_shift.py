@@ -163,20 +163,17 @@ class _ShiftSearch:
     def _widths(self, rows: Array) -> Array:
         """Range of the differences of both times in each box in [s], shape (M,)."""
         t = np.interp(rows, np.arange(len(self._times)), self._times)
-        widths: Array = (t[:, 1] - t[:, 0]) + (t[:, 3] - t[:, 2])
-        return widths
+        return (t[:, 1] - t[:, 0]) + (t[:, 3] - t[:, 2])
 
     def _cut_widths(self, boxes: Boxes) -> Array:
         """Length in [s] of the stretch of each box that would be cut: not that of a robot that stands still."""
         t = np.interp(boxes.rows, np.arange(len(self._times)), self._times)
-        widths: Array = np.where(boxes.reach[:, 1] > boxes.reach[:, 0], t[:, 3] - t[:, 2], t[:, 1] - t[:, 0])
-        return widths
+        return np.where(boxes.reach[:, 1] > boxes.reach[:, 0], t[:, 3] - t[:, 2], t[:, 1] - t[:, 0])
 
     def _smallest(self, boxes: Boxes) -> Array:
         """Smallest shift in each box that is not proved by the distance on one clock, in [s], shape (M,)."""
         t = np.interp(boxes.rows, np.arange(len(self._times)), self._times)
-        smallest: Array = np.maximum(np.maximum(t[:, 2] - t[:, 1], t[:, 0] - t[:, 3]), self._floors[boxes.pair])
-        return smallest
+        return np.maximum(np.maximum(t[:, 2] - t[:, 1], t[:, 0] - t[:, 3]), self._floors[boxes.pair])
 
     def _limit(self, box: Boxes, shift: float) -> None:
         """Record a box that limits the shift."""
@@ -189,15 +186,13 @@ def _merged(rectangles: Array) -> Array:
     """Fewer and larger rectangles round those of a band."""
     first = np.arange(0, len(rectangles), COARSE)
     sign = np.array([1.0, -1.0, 1.0, -1.0])
-    merged: Array = np.minimum.reduceat(rectangles * sign, first) * sign
-    return merged
+    return np.minimum.reduceat(rectangles * sign, first) * sign
 
 
 def _largest(rows: Array, times: Array) -> Array:
     """Largest difference of both times in each box in [s], shape (M,)."""
     t = np.interp(rows, np.arange(len(times)), times)
-    largest: Array = np.maximum(t[:, 3] - t[:, 0], t[:, 1] - t[:, 2])
-    return largest
+    return np.maximum(t[:, 3] - t[:, 0], t[:, 1] - t[:, 2])
 
 
 def _shift_within(motion: FreeMotion, times: Array, bodies: Indices, most: tuple[float, float]) -> float:

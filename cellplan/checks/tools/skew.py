@@ -96,8 +96,7 @@ def _crossing(sums: Array, times: Array, goals: Array) -> Array:
     after = np.clip(np.searchsorted(sums, goals, side="right"), 1, len(sums) - 1)
     rise = sums[after] - sums[after - 1]
     share = np.clip((goals - sums[after - 1]) / np.where(rise > 0.0, rise, 1.0), 0.0, 1.0)
-    crossing: Array = times[after - 1] + share * (times[after] - times[after - 1])
-    return crossing
+    return times[after - 1] + share * (times[after] - times[after - 1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -240,5 +239,4 @@ def _summed(travels: Array) -> Array:
 
 def _norms(change: Array) -> Array:
     """Spectral norms of differences of rotations, shape (M, 3, 3)."""
-    norms: Array = np.sqrt(0.5) * np.linalg.norm(change, axis=(1, 2))
-    return norms
+    return np.sqrt(0.5) * np.linalg.norm(change, axis=(1, 2))

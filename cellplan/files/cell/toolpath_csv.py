@@ -228,8 +228,7 @@ def _units(
     is_bad = ~(np.abs(norms - 1.0) <= UNIT_TOL) if desired == QUATERNION else ~(norms >= SHORTEST_AXIS)
     for row in np.flatnonzero(is_bad):
         findings.add(int(row) + 2, f"expected a {what} ({listed(desired)}) of {length}, got {norms[row]:.6g}")
-    unit: Array = vectors / np.where(norms > 0.0, norms, 1.0)[:, None]
-    return unit
+    return vectors / np.where(norms > 0.0, norms, 1.0)[:, None]
 
 
 def _apart(points: Array, least: float, *, is_closed: bool) -> Flags:

@@ -208,9 +208,8 @@ def _all_hits(tree: _Tree, triangles: Array, starts: Array, *, rays: Array) -> t
 
 def _triple(d: Array, p: Array, q: Array) -> Array:
     """``d . (p x q)`` row by row; changing p for q changes nothing but the sign, to the last bit."""
-    product: Array = (
+    return (
         d[:, 0] * (p[:, 1] * q[:, 2] - p[:, 2] * q[:, 1])
         + d[:, 1] * (p[:, 2] * q[:, 0] - p[:, 0] * q[:, 2])
         + d[:, 2] * (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])
     )
-    return product

@@ -130,5 +130,4 @@ def _singular_values(cell: Cell, model: CombinedModel, constraints: TaskConstrai
     blocks = zip(constraints.tasks, X_PT, J, strict=True)
     picked = [constraint_rows(task, X[None])[0] @ block for task, X, block in blocks]
     rows = np.concatenate(picked)
-    values: Array = np.linalg.svd(rows[:, np.any(signs != 0.0, axis=0)], compute_uv=False)
-    return values
+    return np.linalg.svd(rows[:, np.any(signs != 0.0, axis=0)], compute_uv=False)

@@ -76,5 +76,4 @@ def link_vector(model: RobotModel, joint: int) -> Array:
     axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
     axis = model.joints[joint]
     before = np.zeros(3) if axis.parent == BASE else axes[axis.parent].point_B
-    vector: Array = axis.point_B - before
-    return vector
+    return axis.point_B - before

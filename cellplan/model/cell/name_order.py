@@ -38,8 +38,7 @@ class NameOrder:
 
     def sorted(self, q: Array) -> Array:
         """Stacked joint vectors of the file, shape (..., nq), in the order of names."""
-        moved: Array = q[..., self.columns]
-        return moved
+        return q[..., self.columns]
 
     def as_listed(self, q: Array) -> Array:
         """Stacked joint vectors in the order of names, shape (..., nq), in the order of the file."""

@@ -51,13 +51,11 @@ class Clock:
 
     def at(self, times: Array) -> Array:
         """Nominal times at times in [s] between the rows, linear from row to row, shape (M,)."""
-        sigma: Array = np.interp(times, self.times, self.sigma)
-        return sigma
+        return np.interp(times, self.times, self.sigma)
 
     def reached_at(self, sigma: Array) -> Array:
         """Times in [s] at which nominal times are reached, shape (M,); the nearer end for those outside."""
-        times: Array = np.interp(sigma, self.sigma, self.times)
-        return times
+        return np.interp(sigma, self.sigma, self.times)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

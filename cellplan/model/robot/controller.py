@@ -47,5 +47,4 @@ class ControllerZero:
 
     def to_model(self, positions: Array) -> Array:
         """Positions of the model for those of the controller, both in [rad] or [m], shape (..., n)."""
-        q: Array = self.sign * (positions - positions @ self.coupling.T - self.zero)
-        return q
+        return self.sign * (positions - positions @ self.coupling.T - self.zero)

@@ -20,8 +20,7 @@ class JointSum:
 
     def of(self, q: Array) -> Array:
         """The sum at configurations of shape (..., n) in [rad], shape (...)."""
-        total: Array = q[..., list(self.columns)].sum(axis=-1)
-        return total
+        return q[..., list(self.columns)].sum(axis=-1)
 
     def holds(self, q: Array) -> Flags:
         """Whether configurations of shape (..., n) have it in its range, shape (...)."""

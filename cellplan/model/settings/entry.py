@@ -48,8 +48,7 @@ SHORTEST_DIRECTION: Final = 1e-6  # [-] a shorter vector has no direction
 
 def setting(default: Default, description: str, **options: Any) -> Default:
     """A key that may be left out: what then holds, and what the key means."""
-    value: Default = Field(default=default, description=description, **options)
-    return value
+    return Field(default=default, description=description, **options)
 
 
 def rule(text: str, key: str = "") -> PydanticCustomError:

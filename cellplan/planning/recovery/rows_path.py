@@ -34,8 +34,7 @@ class RowsPath:
         rise = u * u * (3.0 - 2.0 * u)
         bend = u * (1.0 - u)
         change = (self.q[k + 1] - self.q[k]) * rise
-        configuration: Array = self.q[k] + change + step * bend * ((1.0 - u) * slopes[k] - u * slopes[k + 1])
-        return configuration
+        return self.q[k] + change + step * bend * ((1.0 - u) * slopes[k] - u * slopes[k + 1])
 
 
 def rows_along(path: RowsPath, retimer: Retimer, *, widths: tuple[float, float, float]) -> Array:

@@ -103,8 +103,7 @@ def _nearest(scene: Scene, task: Task, path: ClockedPath, last: Array) -> Array:
     turned = within_limits(model, arrived)
     q = np.concatenate([inside, turned])
     times = (np.abs(q - last) / model.velocity).max(axis=1)
-    nearest: Array = q[np.argsort(np.round(times, 6), kind="stable")]
-    return nearest
+    return q[np.argsort(np.round(times, 6), kind="stable")]
 
 
 def with_approach_starts(cell: Cell, chains: Chains, toolpaths: Mapping[str, Toolpath]) -> Cell:

@@ -125,8 +125,7 @@ def _constrained_jacobians(chain: ScrewChain, task: Relation, X_PT: Array, q: Ar
     X_WT = chain.tool_poses(q)
     R_PW = X_PT[:3, :3] @ np.swapaxes(X_WT[:, :3, :3], 1, 2)
     rows = constraint_rows(task, X_PT[None])[0]
-    J: Array = rows @ tip_jacobian(chain.flange_screws(q), X_WT[:, :3, 3], R_PW)
-    return J
+    return rows @ tip_jacobian(chain.flange_screws(q), X_WT[:, :3, 3], R_PW)
 
 
 def tip_jacobian(screws_W: Array, p_WT: Array, R_PW: Array) -> Array:

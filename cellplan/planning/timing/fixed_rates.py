@@ -160,5 +160,4 @@ def _cubic(times: Array, knots: Array, values: Array, slopes: Array) -> Array:
     width, rise = knots[k + 1] - knots[k], values[k + 1] - values[k]
     u = (times - knots[k]) / width
     curved = u * (1.0 - u) * ((1.0 - u) * slopes[k] - u * slopes[k + 1]) * width
-    interpolated: Array = values[k] + u * u * (3.0 - 2.0 * u) * rise + curved
-    return interpolated
+    return values[k] + u * u * (3.0 - 2.0 * u) * rise + curved

@@ -62,8 +62,7 @@ class PathStretch:
         speeds = np.linalg.norm(velocities * self.scale, axis=1)
         known = np.flatnonzero(speeds > REST_SHARE * self.rates.max())
         nearest = known[np.clip(np.searchsorted(known, np.arange(len(sigma))), 0, len(known) - 1)]
-        directions: Array = velocities[nearest] / speeds[nearest, None]
-        return directions
+        return velocities[nearest] / speeds[nearest, None]
 
 
 def stretches(path: JointPath, top_speeds: Array) -> list[PathStretch]:

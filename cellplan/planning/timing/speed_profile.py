@@ -44,8 +44,7 @@ class SpeedProfile:
         if window > 0.0:
             return (self._area(times) - self._area(times - window)) / window
         k, elapsed = self._place(times)
-        within: Array = self.lengths[k] + elapsed * (self.speeds[k] + 0.5 * elapsed * self._accelerations[k])
-        return within
+        return self.lengths[k] + elapsed * (self.speeds[k] + 0.5 * elapsed * self._accelerations[k])
 
     @property
     def _accelerations(self) -> Array:

@@ -82,8 +82,7 @@ class StraightMoves:
         """Pairs that are too near in some rows already, which takes less than a certificate to see."""
         demands = self._demands
         near = self._scene.near(line, float(demands.max(initial=0.0)))
-        rows: list[int] = np.unique(near.rows[near.distances < demands[near.rows] - NEARER]).tolist()
-        return rows
+        return np.unique(near.rows[near.distances < demands[near.rows] - NEARER]).tolist()
 
     @cached_property
     def _demands(self) -> Array:

@@ -22,8 +22,7 @@ MOST_OF_A_GROUP: Final = 8  # [-] failed checks that are shown; further ones are
 
 def read_record(folder: Path) -> Record:
     """The report of a run on disk."""
-    record: Record = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-    return record
+    return json.loads((folder / "report.json").read_text(encoding="utf-8"))
 
 
 def summary_lines(record: Record, folder: Path) -> list[str]:

@@ -279,8 +279,7 @@ def dwell_times(stage: Stage) -> Array:
     """Times of the rows of a dwell in [s], shape (N,)."""
     step = stage.cell.motion.step
     count = max(1, int(np.ceil((stage.dwell or 0.0) / step - CLOSED)))
-    times: Array = np.round(np.arange(count + 1) * step, TIME_DECIMALS)
-    return times
+    return np.round(np.arange(count + 1) * step, TIME_DECIMALS)
 
 
 Pass = tuple[Array, float]  # a stacked configuration, shape (nq,), and the time in [s] for which all stand in it

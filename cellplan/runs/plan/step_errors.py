@@ -38,8 +38,7 @@ class StepErrors:
             sigma: Nominal times in [s], shape (N,).
             step: Time between two rows in [s].
         """
-        root: Array = step * np.interp(sigma, self._at, self._root)
-        return root
+        return step * np.interp(sigma, self._at, self._root)
 
     def largest(self, sigma: Array) -> Array:
         """Largest error in each step between nominal times in [s], as a share of what is allowed, shape (N - 1,)."""

@@ -228,5 +228,4 @@ def _stretches(problem: Problem, point: Point) -> tuple[PacedStretch, ...]:
 
 def _per_row(values: Array, factors: Array) -> Array:
     """Values (M, ...) times a factor of each row (M,)."""
-    scaled: Array = values * factors.reshape(-1, *(1,) * (values.ndim - 1))
-    return scaled
+    return values * factors.reshape(-1, *(1,) * (values.ndim - 1))

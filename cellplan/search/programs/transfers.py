@@ -114,8 +114,7 @@ class Transfers:
     def _ends(self, of_nodes: Array, at_home: Array) -> Array:
         """Values at both ends of each leg, shape (2, T, nq, ...), from those of the nodes, (N, nq, ...)."""
         is_home = (self.ends == HOME).reshape(*self.ends.shape, *(1,) * (of_nodes.ndim - 2))
-        ends: Array = np.where(is_home, at_home, of_nodes[self.ends, np.arange(of_nodes.shape[1])])
-        return ends
+        return np.where(is_home, at_home, of_nodes[self.ends, np.arange(of_nodes.shape[1])])
 
     def _times(self, begin: Array, end: Array) -> Array:
         """Times of straight moves in [s], shape (..., nq) each to (...)."""

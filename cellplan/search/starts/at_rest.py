@@ -211,8 +211,7 @@ def _costs(problem: StartProblem, robot: int, q: Array, margins: Array) -> Array
         np.sqrt(np.abs(rates @ velocities) / problem.acceleration[columns]),
     )
     longest = np.maximum(*(share.max(axis=(1, 2)) for share in shares))
-    costs: Array = np.log(np.maximum(longest, 1e-9)) + np.maximum(0.0, 1.0 - margins.min(axis=(1, 2)) / ROOMY)
-    return costs
+    return np.log(np.maximum(longest, 1e-9)) + np.maximum(0.0, 1.0 - margins.min(axis=(1, 2)) / ROOMY)
 
 
 def _free(problem: StartProblem, robot: int, setting: Setting, X_WB: Array, q: Array, drops: Counter[str]) -> Indices:

@@ -85,5 +85,4 @@ def _distinct(q: Array) -> Array:
         return q
     q = q[np.lexsort(np.round(q / SAME_POSTURE).T[::-1])]
     is_new = np.append(True, np.abs(np.diff(q, axis=0)).max(axis=1) > SAME_POSTURE)
-    distinct: Array = q[is_new]
-    return distinct
+    return q[is_new]

@@ -208,8 +208,7 @@ class StartProblem:
         columns = self.cell.columns(self.cell.positioners[0])
         X_BF = self.arms[self.cell.carrier].flanges(layouts.start[:1, columns])[0]
         X_WB, X_FT = (part[0, self.cell.carrier] for part in (layouts.X_WB, layouts.X_FT))
-        pose: Array = X_WB @ X_BF @ X_FT @ self.cell.part.X_CP
-        return pose
+        return X_WB @ X_BF @ X_FT @ self.cell.part.X_CP
 
     def bounds(self, robot: int) -> BaseBounds:
         """How far the base of a robot may be moved."""

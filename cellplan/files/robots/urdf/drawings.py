@@ -44,8 +44,7 @@ def edges_of_box(solids: Sequence[tuple[Solid, Array]]) -> Array:
     sides = np.vstack([np.eye(3), -np.eye(3)])
     reach = [support(shape, sides @ X_LS[:3, :3]) + sides @ X_LS[:3, 3] for shape, X_LS in solids]
     farthest = np.max(reach, axis=0)
-    edges: Array = farthest[:3] + farthest[3:]
-    return edges
+    return farthest[:3] + farthest[3:]
 
 
 def small_bodies(

@@ -197,8 +197,7 @@ def _range(document: UrdfDocument, leader: UrdfJoint) -> float:
 
 def _direction(finger: Finger, configuration: ZeroConfiguration) -> Array:
     """Unit direction in B in which a finger opens."""
-    direction: Array = np.sign(finger.ratio) * configuration.X_BJ[finger.joint.name][:3, :3] @ finger.joint.axis_J
-    return direction
+    return np.sign(finger.ratio) * configuration.X_BJ[finger.joint.name][:3, :3] @ finger.joint.axis_J
 
 
 def _middle(link: str, bodies: Sequence[Body], u: Array) -> float:

@@ -75,8 +75,7 @@ def least_skew_record(reports: Iterable[Report]) -> SkewKey:
     """The allowed skew of that phase of several, one after another, that allows least; see ``skew_record``."""
     known = [(report.skew.allowed, report) for report in reports if report.skew is not None]
     _, least = min(known, key=lambda pair: pair[0], default=(None, None))
-    record: SkewKey = {} if least is None else in_phase(skew_record(least), str(least.phase))
-    return record
+    return {} if least is None else in_phase(skew_record(least), str(least.phase))
 
 
 def skew_record(report: Report) -> SkewKey:

@@ -186,8 +186,7 @@ def _depths_in_mesh(probe: Engine, mesh: Mesh, points: Array, *, worth: Array, s
         sides = np.where((sides == 0.0) & (np.abs(height) >= STRAIGHT * depths), np.sign(height), sides)
     undecided = np.flatnonzero(is_relevant & (sides == 0.0))
     sides[undecided] = np.where(_is_within(mesh, points[undecided]), -1.0, 1.0)
-    inside_depths: Array = np.where(is_relevant, -sides * depths, 0.0)
-    return inside_depths
+    return np.where(is_relevant, -sides * depths, 0.0)
 
 
 def _is_within(mesh: Mesh, points: Array) -> Flags:
@@ -195,14 +194,12 @@ def _is_within(mesh: Mesh, points: Array) -> Flags:
     if not len(points):
         return np.zeros(0, dtype=bool)
     if has_several_solids(mesh):
-        within: Flags = ray_winding(mesh.vertices[mesh.faces], points) > 0
-        return within
+        return ray_winding(mesh.vertices[mesh.faces], points) > 0
     normals = _normals(mesh.vertices[mesh.faces])
     rays = np.repeat(RAYS, len(points), axis=0)
     hits = ray_hits(mesh, np.tile(points, (len(RAYS), 1)), rays)
     leaves = np.einsum("ij,ij->i", normals[hits.faces], rays) > 0.0  # the first triangle is seen from within
-    inside: Flags = (hits.is_hit & leaves).reshape(len(RAYS), -1).sum(axis=0) >= 2
-    return inside
+    return (hits.is_hit & leaves).reshape(len(RAYS), -1).sum(axis=0) >= 2
 
 
 def _normals(corner: Array) -> Array:
