@@ -5,8 +5,7 @@ import shlex
 
 import pytest
 
-from cellplan.cli.main import COMMANDS, run
-from cellplan.cli.overview import EXAMPLES, FIRST_STEPS
+from cellplan.cli.main import COMMANDS, EXAMPLES, FIRST_STEPS, run
 
 STEPS = re.findall(r"^  (cellplan .*?)  ", FIRST_STEPS, re.MULTILINE)
 LINES = [*STEPS, *(line for lines in EXAMPLES.values() for line in lines)]

@@ -17,9 +17,9 @@ from cellplan.files.robots.bundled import load_bundled_table
 from cellplan.files.robots.joint_table import RobotTable, load_robot_table
 from cellplan.files.robots.rules import limits_in_si, tightened
 from cellplan.files.robots.urdf import XACRO_SUFFIX
-from cellplan.files.schema.gripper import GripperEntry
 from cellplan.files.schema.path import CsvEntry
 from cellplan.files.schema.robot import RobotEntry
+from cellplan.files.schema.tool import GripperEntry
 from cellplan.files.yaml.reader import YamlDocument
 from cellplan.geometry.mesh.load import read_drawing
 from cellplan.geometry.shapes import Mesh

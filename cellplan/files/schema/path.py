@@ -1,13 +1,28 @@
-"""Paths of tools as written in a cell file."""
+"""Paths of tools, and given paths of a positioner's joints, as written in a cell file."""
 
-from typing import Annotated, ClassVar, Final, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
 from cellplan.files.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
-from cellplan.model.settings.entry import Coordinate, Direction, Entry, OneOf, Text, by_kind, rule, setting
+from cellplan.model.settings.entry import (
+    FARTHEST_MM,
+    Angle,
+    Coordinate,
+    Direction,
+    Entry,
+    OneOf,
+    Text,
+    by_kind,
+    rule,
+    setting,
+)
 from cellplan.model.settings.units import Mm, Within
 
+COEFFICIENT_LIMIT: Final = 400  # more are a table of the motion, not a spline
+
+JointValue = Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)]
+Row = tuple[float, ...] | dict[str, Any]
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
 CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
 MOST_JOINED_MM: Final = 1.0  # points farther apart than this are two points of a path
@@ -106,3 +121,43 @@ class PathEntry(OneOf):
     def is_planar(self) -> bool:
         """Whether the path is drawn in a plane of the part frame."""
         return self.polyline.plane is not None if self.polyline is not None else self.csv is None
+
+
+class JointPathEntry(Entry):
+    """The joints of a positioner as a B-spline over the common clock, at rest at both ends."""
+
+    degree: Literal[3, 5] = setting(
+        5, "Degree of the polynomials between two knots; the knots are evenly spaced over the clock."
+    )
+    coefficients_deg: tuple[tuple[Angle, ...], ...] | None = setting(
+        None,
+        "Coefficients, one configuration each with one angle per joint, for robots with revolute joints only. The "
+        "first is the start posture, the last the end; both count three times, so that the joints begin and end at "
+        "rest and without acceleration. The path passes near the others.",
+        min_length=2,
+        max_length=COEFFICIENT_LIMIT,
+    )
+    coefficients: tuple[dict[str, JointValue], ...] | None = setting(
+        None,
+        "The same with one key per joint with its unit (a1_deg, rail_mm); excludes coefficients_deg.",
+        min_length=2,
+        max_length=COEFFICIENT_LIMIT,
+    )
+
+    @model_validator(mode="after")
+    def _is_given_once(self) -> Self:
+        """Coefficients in one of both spellings."""
+        if (self.coefficients_deg is None) == (self.coefficients is None):
+            got = "neither" if self.coefficients is None else "both"
+            raise rule(f"expected either coefficients_deg or coefficients, got {got}")
+        return self
+
+    @property
+    def key(self) -> str:
+        """The key under which the coefficients are given."""
+        return "coefficients_deg" if self.coefficients is None else "coefficients"
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """The coefficients as they are written."""
+        return self.coefficients if self.coefficients is not None else self.coefficients_deg or ()

@@ -4,10 +4,9 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from cellplan.files.schema.gripper import GripperEntry
-from cellplan.files.schema.joint_path import JointPathEntry
 from cellplan.files.schema.mounting import AttachmentEntry, HangingEntry, PedestalEntry, RailBodyEntry, WallEntry
-from cellplan.files.schema.tool import ToolEntry
+from cellplan.files.schema.path import JointPathEntry
+from cellplan.files.schema.tool import GripperEntry, ToolEntry
 from cellplan.model.settings.acceleration import AccelerationChoice, CycleTime
 from cellplan.model.settings.controllers import RobotControlEntry
 from cellplan.model.settings.entry import (

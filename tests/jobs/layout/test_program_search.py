@@ -54,7 +54,7 @@ def test_a_program_as_it_is_written_gets_shorter_transfers(tmp_path: Path) -> No
 @pytest.mark.slow
 def test_a_program_keeps_its_demands_with_misplaced_bases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cellplan.jobs.layout.finish.misplacement.OF_PROGRAM", 2)
-    monkeypatch.setattr("cellplan.search.misplacement.worst.MOST", 1)
+    monkeypatch.setattr("cellplan.search.misplacement.robust.MOST", 1)
     path = tmp_path / "cell.yaml"
     path.write_text(PICK_AND_PLACE)
     request = LayoutRequest(cell=path, objective=Objective.CONFORMING, misplacement=(2.0, 0.2))

@@ -11,7 +11,7 @@ from cellplan.files.cell.toolpath_csv import read_toolpath_csv
 from cellplan.geometry.curves.curve import chord_lengths, smooth_through, straight_sides
 from cellplan.model.task.task import SampledPath, SpacePolylinePath, TimedPath
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.path.point_spacing import largest_bulge
+from cellplan.planning.path.curve import largest_bulge
 
 WAVE = ((-0.08, -0.05, 0.3), (-0.04, 0.03, 0.3), (0.0, -0.02, 0.3), (0.04, 0.03, 0.3), (0.08, -0.05, 0.3))
 

@@ -16,8 +16,7 @@ from cellplan.runs.plan.sequence import plan_work
 from cellplan.search.misplacement.corners import judged
 from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.misplacement.guarded import GuardedProgram, guarded
-from cellplan.search.misplacement.robust import scenarios_of
-from cellplan.search.misplacement.worst import worst
+from cellplan.search.misplacement.robust import scenarios_of, worst
 from cellplan.search.programs.measures import Measures
 from cellplan.search.programs.objective import Effort, Objective
 

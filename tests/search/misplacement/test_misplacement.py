@@ -16,9 +16,8 @@ from cellplan.model.settings.layout import MisplacementEntry
 from cellplan.search.misplacement.corners import judged
 from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.misplacement.guarded import guarded
-from cellplan.search.misplacement.robust import RobustSearch, ScenarioProblem, robust_layout, seeded_signs
+from cellplan.search.misplacement.robust import RobustSearch, ScenarioProblem, robust_layout, seeded_signs, worst
 from cellplan.search.misplacement.tolerance import tolerances
-from cellplan.search.misplacement.worst import worst
 from cellplan.search.programs.measures import Measures
 from cellplan.search.programs.objective import Demands, Effort, Objective
 

@@ -10,7 +10,7 @@ from cellplan.model.seeds import generator
 from cellplan.planning.start.inverse_kinematics import reaching_configurations, within_limits
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.search.starts.at_rest import pool, settings
-from cellplan.search.starts.postures import branches
+from cellplan.search.starts.generator import branches
 from cellplan.search.starts.reaching import BaseBounds, PlacedDraws, followed, matched, reached
 from tests.search.starts.conftest import DRAWS
 

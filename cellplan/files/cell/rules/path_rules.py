@@ -8,8 +8,8 @@ import numpy as np
 from cellplan.files.cell.rules.rules import holders_as_written, operators_as_written
 from cellplan.files.input.findings import Finding, KeyPath, listed, unknown_name
 from cellplan.files.robots.rules import configuration_findings
-from cellplan.files.schema.joint_path import JointPathEntry
 from cellplan.files.schema.partial import ValidEntries
+from cellplan.files.schema.path import JointPathEntry
 from cellplan.files.yaml.reader import YamlDocument
 from cellplan.model.cell.joint_spline import JointSpline
 from cellplan.model.robot.robot import RobotModel, configuration_in_si, start_keys
