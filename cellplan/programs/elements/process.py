@@ -1,5 +1,6 @@
 """Process of a task in programs: the statements of its controller, in the three forms that makers have."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -73,7 +74,7 @@ class ProcessForm:
         template = text or ""
         if circular:
             head, _, rest = template.partition("{point}")
-            template = f"{head.replace('L', 'C', 1)}{{via}}, {{point}}{rest}"
+            template = f"{re.sub('[lL]', 'C', head, count=1)}{{via}}, {{point}}{rest}"
         return _ended(self.kind, template.format_map(slots))
 
     def _texts(self, form: StatementForm, *, on: bool, task: str) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple, NoReturn
 from cellplan.errors import InputError
 
 MADE_OF: Final = {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"}  # as they are spelled
+NONE: Final = r"(?!)"  # the pattern of no name
 LINE: Final = 78  # characters of a comment; the shortest limit of all dialects is above 80
 
 
@@ -37,15 +38,19 @@ def comment(note: str, sign: str, *, forbidden: str = "", longest: int = LINE) -
     return [f"{sign} {line}".rstrip() for line in lines]
 
 
-def safe_names(names: Iterable[str], *, longest: int, reserved: Collection[str] = ()) -> dict[str, str]:
+def safe_names(
+    names: Iterable[str], *, longest: int, reserved: Collection[str] = (), data: str = NONE
+) -> dict[str, str]:
     """Names that a controller takes, by the name in the cell: letters, digits and underscores, unique without case.
 
-    The order of the names decides, and words of the language, in any case, are reserved.
+    The order of the names decides. Reserved are words of the language, in any case, and names of other data, which
+    follow a pattern.
     """
     words, taken, chosen = _lower_case(frozenset(reserved)), set[str](), dict[str, str]()
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", ascii_text(name)).strip("_") or "x"
-        plain = plain if plain[0].isalpha() else f"p_{plain}"
+        is_free = plain[0].isalpha() and not re.fullmatch(data, plain, re.IGNORECASE)
+        plain = plain if is_free else f"p_{plain}"
         safe_name, number = plain[:longest], 1
         while safe_name.lower() in taken or safe_name.lower() in words:
             number += 1
@@ -54,6 +59,25 @@ def safe_names(names: Iterable[str], *, longest: int, reserved: Collection[str] 
         taken.add(safe_name.lower())
         chosen[name] = safe_name
     return chosen
+
+
+def point_stems(
+    routines: Mapping[str, str], *, longest: int, others: Collection[str] = (), data: str = NONE
+) -> dict[str, str]:
+    """What names of points, ``STEM_1``, ``STEM_2`` and so on, begin with, by the task of a routine.
+
+    That is the name of the routine, or one with a ``p`` behind it where a point would have the name of a routine, of
+    something else, or of other data, which follow a pattern.
+    """
+    names, stems = (*routines.values(), *others), dict[str, str]()
+    for task, routine in routines.items():
+        for letters in range(longest):
+            stem = f"{routine[: longest - letters - 1]}_{'p' * letters}" if letters else routine
+            is_other = any(re.fullmatch(rf"{stem}_\d+", name, re.IGNORECASE) for name in names)
+            if not (is_other or re.fullmatch(data, f"{stem}_1", re.IGNORECASE) or stem in stems.values()):
+                break
+        stems[task] = stem
+    return stems
 
 
 @lru_cache(maxsize=8)

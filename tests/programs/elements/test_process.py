@@ -52,12 +52,13 @@ def test_motions_have_their_slots_filled() -> None:
     ]
 
 
-def test_a_motion_of_dispensing_keeps_its_switch_on_a_circle() -> None:
+@pytest.mark.parametrize("name", ["DispL", "displ", "DISPL"])  # RAPID has no case
+def test_a_motion_of_dispensing_keeps_its_switch_on_a_circle(name: str) -> None:
     bead = r"{point}, {speed}, bead1, {zone}, {tool}\WObj:={frame}"
-    disp = form("abb", on=rf"DispL\On, {bead}", inner=f"DispL {bead}", off=rf"DispL\Off, {bead}")
+    disp = form("abb", on=rf"{name}\On, {bead}", inner=f"{name} {bead}", off=rf"{name}\Off, {bead}")
 
     assert disp.move("off", circular=True, slots=SLOTS) == (
-        r"DispC\Off, seam_p1, seam_p2, v8, bead1, fine, torch\WObj:=frame_1;"
+        rf"{name[:-1]}C\Off, seam_p1, seam_p2, v8, bead1, fine, torch\WObj:=frame_1;"
     )
 
 

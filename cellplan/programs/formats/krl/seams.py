@@ -21,11 +21,13 @@ from cellplan.programs.elements.pages import ENDING, PagedProgram
 from cellplan.programs.elements.text import fixed, safe_names
 from cellplan.programs.formats.krl.axes import external_axes, machine_of
 from cellplan.programs.formats.krl.poses import components, frame_text, pose_text, status_and_turn
-from cellplan.programs.formats.krl.text import MODULES, NAME, POINT, WHOLE
+from cellplan.programs.formats.krl.text import MODULES, NAME, POINT, POINT_NAME, WHOLE
 
 MODES: Final = ("$IPO_MODE=#BASE", "$ORI_TYPE=#VAR", "$CIRC_TYPE=#BASE")  # no tool that stands, no wrist axes
 TOOL: Final = "TOOL_FRAME"
 PART: Final = "PART_FRAME_"  # and the number of the station, from 1
+DATA: Final = rf"{POINT_NAME}|{PART}[0-9]+"
+LONGEST_ROUTINE: Final = NAME - ENDING
 SPEED_DECIMALS: Final = 6  # of a metre in a second
 ZONE_DECIMALS: Final = 3  # of a millimetre
 WAIT_DECIMALS: Final = 3
@@ -55,7 +57,7 @@ def routine_names(frame: ExportFrame, robot: str, module: str) -> dict[str, str]
     tasks = [task.name for task in frame.cell.tasks if task.robot == robot]
     form = krl_events(frame, robot).form
     reserved = {*MODULES.reserved, module, TOOL, *(form.routines if form else ())}
-    return safe_names(tasks, longest=NAME - ENDING, reserved=reserved)
+    return safe_names(tasks, longest=LONGEST_ROUTINE, reserved=reserved, data=DATA)
 
 
 def tool_text(robot: Robot) -> str:
@@ -92,6 +94,7 @@ class SeamWriter:
     program: PagedProgram  # what is written of it, numbers in the order of a point
     moves: Sequence[Move]
     names: Mapping[str, str]  # of the routine of each task
+    stems: Mapping[str, str]  # with which names of its points begin
 
     @property
     def robot(self) -> str:
@@ -101,7 +104,7 @@ class SeamWriter:
     def point(self, row: int) -> str:
         """Name of the point of a row."""
         seam = next((seam for seam in self.program.rows.seams if seam.first < row <= seam.last), None)
-        return f"{POINT}{row + 1}" if seam is None else f"{self.names[seam.task]}_{row - seam.first}"
+        return f"{POINT}{row + 1}" if seam is None else f"{self.stems[seam.task]}_{row - seam.first}"
 
     def points(self) -> Iterator[str]:
         """Declarations of frames and points."""

@@ -22,11 +22,20 @@ from cellplan.programs.elements.pages import (
     require_rows,
     shares_as_written,
 )
-from cellplan.programs.elements.text import comment, joined
+from cellplan.programs.elements.text import comment, joined, point_stems
 from cellplan.programs.formats.krl.axes import demands, moved_robots, order_of_axes, played_robots
 from cellplan.programs.formats.krl.poses import components, status_and_turn
 from cellplan.programs.formats.krl.reader import read_krl
-from cellplan.programs.formats.krl.seams import MODES, SeamWriter, krl_events, routine_names, signal_text, tool_text
+from cellplan.programs.formats.krl.seams import (
+    DATA,
+    LONGEST_ROUTINE,
+    MODES,
+    SeamWriter,
+    krl_events,
+    routine_names,
+    signal_text,
+    tool_text,
+)
 from cellplan.programs.formats.krl.seams_reader import read_seams
 from cellplan.programs.formats.krl.text import MODULES, POINT, WHOLE
 
@@ -61,11 +70,13 @@ def _paths(frame: ExportFrame) -> dict[tuple[str | None, str], str]:
 def _with_seams(job: ExportJob, program: ProgramRows, part: PagedProgram) -> dict[str, str]:
     """The files of a robot with seams."""
     path, robot = part.path, part.placed.name
+    names = routine_names(job.frame, robot, part.name)
     seams = SeamWriter(
         frame=job.frame,
         program=part,
         moves=moves_of(job, program, krl_events(job.frame, robot)),
-        names=routine_names(job.frame, robot, part.name),
+        names=names,
+        stems=point_stems(names, longest=LONGEST_ROUTINE, others=(part.name,), data=DATA),
     )
     routines = seams.routines()
     head = [line for note in part.notes for line in comment(note, ";")]

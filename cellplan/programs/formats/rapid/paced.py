@@ -27,7 +27,7 @@ from cellplan.programs.elements.paced import (
     moves_of,
     rows_of_moves,
 )
-from cellplan.programs.elements.text import fixed, safe_names
+from cellplan.programs.elements.text import fixed, point_stems, safe_names
 from cellplan.programs.formats.rapid.data import RapidData
 from cellplan.programs.formats.rapid.moves import STOP, TURN, Place, RapidMove, read_move
 from cellplan.programs.formats.rapid.rows import UNIT_TOL, rounding, rows_of
@@ -38,6 +38,7 @@ from cellplan.programs.formats.rapid.units import DECIMALS, LONGEST_NAME, RESERV
 from cellplan.programs.formats.zones import LEAST_SHARE, on_scale
 
 LONGEST_ROUTINE: Final = LONGEST_NAME - 5  # room for the number of a point
+DATA: Final = r"(?:j|s|z|w_part|trigg)(?:_\d+)+"  # names of joints, speeds, zones, work objects and triggers
 WAIT_DECIMALS: Final = 3
 LAST: Final = 1  # [deg/s] by which rounding changes a turn
 NEAR: Final = 1.5e-4  # [mm] or [-] rounding of a frame; a quaternion has more decimals
@@ -87,7 +88,7 @@ def routine_names(frame: ExportFrame, unit: RapidUnit) -> dict[str, str]:
     tasks = [task.name for task in frame.cell.tasks if task.robot == unit.robot.name]
     form = rapid_events(frame, unit).form
     reserved = {*RESERVED, *(form.routines if form else ()), unit.module, unit.tool, TRIGGER}
-    return safe_names(tasks, longest=LONGEST_ROUTINE, reserved=reserved)
+    return safe_names(tasks, longest=LONGEST_ROUTINE, reserved=reserved, data=DATA)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -99,23 +100,25 @@ class PacedWriter:
     rows: RobotRows
     moves: tuple[Move, ...]
     names: Mapping[str, str]  # of the routine of each task
+    stems: Mapping[str, str]  # with which names of its points begin
 
     @classmethod
     def of(cls, job: ExportJob, program: ProgramRows, unit: RapidUnit) -> "PacedWriter":
         """Those of a program."""
-        events = rapid_events(job.frame, unit)
+        events, names = rapid_events(job.frame, unit), routine_names(job.frame, unit)
         return cls(
             job=job,
             unit=unit,
             rows=program.robots[unit.robot.name],
             moves=moves_of(job, program, events),
-            names=routine_names(job.frame, unit),
+            names=names,
+            stems=point_stems(names, longest=LONGEST_ROUTINE, others=(unit.module, unit.tool), data=DATA),
         )
 
     def point(self, row: int) -> str:
         """Name of the point of a row."""
         seam = next((seam for seam in self.rows.seams if seam.first < row <= seam.last), None)
-        return f"j_{row + 1}" if seam is None else f"{self.names[seam.task]}_{row - seam.first}"
+        return f"j_{row + 1}" if seam is None else f"{self.stems[seam.task]}_{row - seam.first}"
 
     def data(self) -> Iterator[str]:
         """Declarations of work objects, speeds and points."""

@@ -40,6 +40,7 @@ RADIUS_DECIMALS: Final = 6  # of a metre
 POSE_DECIMALS: Final = 9  # of a metre and of a radian
 UR: Final = CONVENTIONS["ur"]
 PART: Final = "part_"  # and the number of the station, from 1
+DATA: Final = rf"(?:j|page|{PART.rstrip('_')})_[0-9]+"
 
 
 def urscript_events(frame: ExportFrame, robot: str) -> Events:
@@ -58,7 +59,7 @@ def routine_names(frame: ExportFrame, robot: str) -> dict[str, str]:
     tasks = [task.name for task in frame.cell.tasks if task.robot == robot]
     form = urscript_events(frame, robot).form
     reserved = {*RESERVED, *function_names(frame).values(), *(form.routines if form else ())}
-    return safe_names(tasks, longest=LONGEST_NAME, reserved=reserved)
+    return safe_names(tasks, longest=LONGEST_NAME, reserved=reserved, data=DATA)
 
 
 def pose_text(X: Array) -> str:
@@ -97,11 +98,12 @@ class SeamWriter:
     rows: RobotRows
     moves: Sequence[Move]
     names: Mapping[str, str]  # of the routine of each task
+    stems: Mapping[str, str]  # with which names of its points begin
 
     def point(self, row: int) -> str:
         """Name of the point of a row."""
         seam = next((seam for seam in self.rows.seams if seam.first < row <= seam.last), None)
-        return f"j_{row + 1}" if seam is None else f"{self.names[seam.task]}_{row - seam.first}"
+        return f"j_{row + 1}" if seam is None else f"{self.stems[seam.task]}_{row - seam.first}"
 
     def lines(self, joints: Sequence[str]) -> list[str]:
         """Declarations, routines and what calls them; ``joints`` are those of each row as they are written."""

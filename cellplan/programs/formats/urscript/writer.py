@@ -22,14 +22,15 @@ from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.joints import Angle, to_numbers
 from cellplan.programs.elements.paced import moves_of
 from cellplan.programs.elements.pages import pages_of
-from cellplan.programs.elements.text import comment, joined
+from cellplan.programs.elements.text import comment, joined, point_stems
 from cellplan.programs.elements.timed_rows import cycle_of, file_path, times_of
 from cellplan.programs.formats.urscript.reader import read_urscript
 from cellplan.programs.formats.urscript.rows import blend_radii, move_acceleration, move_speeds
-from cellplan.programs.formats.urscript.seams import SeamWriter, routine_names, urscript_events
+from cellplan.programs.formats.urscript.seams import DATA, SeamWriter, routine_names, urscript_events
 from cellplan.programs.formats.urscript.text import (
     DECIMALS,
     ENDING,
+    LONGEST_NAME,
     MOST_ROWS,
     OFF_CYCLE,
     approach_call,
@@ -60,9 +61,9 @@ def render_urscript(job: ExportJob) -> dict[str, str]:
             points = _points(robot, rows, decimals_of_urscript(job.frame, robot))
             if job.frame.promise is Promise.PACED:
                 moves = moves_of(job, program, urscript_events(job.frame, name))
-                seams = SeamWriter(
-                    frame=job.frame, robot=robot, rows=rows, moves=moves, names=routine_names(job.frame, name)
-                )
+                routines = routine_names(job.frame, name)
+                stems = point_stems(routines, longest=LONGEST_NAME, others=names.values(), data=DATA)
+                seams = SeamWriter(frame=job.frame, robot=robot, rows=rows, moves=moves, names=routines, stems=stems)
                 body = seams.lines(points)
             else:
                 is_timed = job.frame.promise is Promise.TIMED
