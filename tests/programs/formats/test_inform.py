@@ -6,11 +6,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders.elbow_arm import tip
-from builders.seam_jobs import ARC_AND_WEAVE, CONTROLLER, PLACES, ROBOT, SEAM, X_WP, inform_job, run_of, seam_job
+from builders.seam_jobs import (
+    ARC_AND_WEAVE,
+    CONTROLLER,
+    PLACES,
+    ROBOT,
+    SEAM,
+    X_WP,
+    inform_job,
+    joints_at,
+    poses,
+    run_of,
+    seam_job,
+)
 
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.geometry.transforms import pose_from, rotation_exp
-from cellplan.model.report.exported import ExportJob
+from cellplan.model.report.exported import ExportJob, RobotRows
 from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.programs.formats.inform.positions import configuration, joints_of
 from cellplan.programs.formats.inform.writer import INFORM
@@ -236,3 +248,68 @@ def test_a_larger_level_is_noticed(level: str, message: str) -> None:
         finding = str(error)
 
     assert message in finding
+
+
+def ring_job(*, bulge: float = 0.0, pause: bool = False) -> ExportJob:
+    """A ring in three arcs: the last one may lead through a point outside, by so much in [m], the middle one be idle."""
+    job = inform_job()
+    rows, robot = job.programs[0].robots[ROBOT], job.frame.robot(ROBOT)
+    angles = np.arange(7) * np.pi / 3.0
+    radii = 0.05 + np.array([0.0, 0.0, 0.0, 0.0, 0.0, bulge, 0.0])
+    places = np.column_stack([0.1 + radii * np.cos(angles), radii * np.sin(angles), np.zeros(7)])
+    X = np.repeat(poses()[:1], 9, axis=0)
+    X[:, :3, 3] = [(0.15, 0.0, 0.1), *places, (0.15, 0.0, 0.1)]
+    X_PT = np.concatenate([np.full((2, 4, 4), np.nan), X[1:], np.full((1, 4, 4), np.nan)])
+    process = np.array([False, False, *[True] * 6, False, False, False])
+    process[4:6] = not pause
+    ring = RobotRows(
+        robot=ROBOT,
+        q=np.array([rows.q[0], *(joints_at(robot, one) for one in X), rows.q[0]]),
+        times=np.arange(11.0),
+        process=process,
+        rounding=np.zeros(11) if pause else np.isin(np.arange(11), (4, 6)) * 0.5,
+        X_PT=X_PT,
+        feeds=np.array([np.nan, np.nan, 0.05, *[0.008] * 6, 0.05, np.nan]),
+        middles=np.isin(np.arange(11), (3, 5, 7)),
+        seams=(replace(SEAM, last=9),),
+    )
+    return replace(job, programs=(replace(job.programs[0], robots={ROBOT: ring}),))
+
+
+@pytest.mark.parametrize(
+    ("changes", "moves"),
+    [
+        ({}, "J L CC CC CC C L"),
+        ({"bulge": 1e-5}, "J L CCCCC LCCC L"),
+        ({"pause": True}, "J L CCC LCCC LCCC L"),
+    ],
+    ids=str,
+)
+def test_arcs_of_one_circle_share_their_points(changes: dict[str, float], moves: str) -> None:
+    job = ring_job(**changes)  # type: ignore[arg-type]
+    files = INFORM.render(job)
+
+    read = INFORM.read(job.frame, files)
+
+    assert "".join(re.findall(r"MOV([JLC])", files["SEAM.JBI"])) == moves.replace(" ", "")
+    assert list(other_rows(INFORM, job, read)) == []
+
+
+@pytest.mark.parametrize(
+    ("pattern", "repl", "words"),
+    [
+        (r"(C00005=-?\d+\.\d\d)\d", r"\g<1>9", "MOVL between arcs of two circles"),
+        (r"(MOVC C00005 V=)8\.0", r"\g<1>9.0", "at the speed of its start"),
+        (r"(MOVC C00005 V=8\.0) PL=1", r"\1 PL=2", "a point of an arc with PL=1"),
+        (r"(MOVC C00004 .*\r\n)", r"\1TIMER T=0.10\r\n", "MOVC to where the tool is"),
+        (r"(MOVC C0000[78] .*\r\n)+", "", "MOVC to where the tool is|each position used"),
+    ],
+)
+def test_a_change_of_a_ring_is_noticed(pattern: str, repl: str, words: str) -> None:
+    job = ring_job()
+    files = INFORM.render(job)
+    text, count = re.subn(pattern, repl, files["SEAM.JBI"], count=1)
+    assert (count, text == files["SEAM.JBI"]) == (1, False)
+
+    with pytest.raises(InputError, match=words):
+        INFORM.read(job.frame, files | {"SEAM.JBI": text})

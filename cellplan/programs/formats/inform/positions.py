@@ -26,6 +26,7 @@ WIDTH: Final = 24  # of all its numbers; older controllers have fewer
 TURNED: Final = (3, 5, 0)  # axes R, T and S, whose half turns it states
 REAR: Final = 2  # place of the number for front or rear
 EDGE: Final = 1e-4  # [deg] from the edge of a configuration within which either of its sides is right
+ONE_CIRCLE: Final = 3e-6  # [m] of points with three decimals of a millimetre, from the circle through three of them
 LIMIT_TOL: Final = 1e-6  # [rad] by which rounding takes an axis beyond its limit
 
 
@@ -41,6 +42,19 @@ def configuration(robot: Robot, q: Array) -> NDArray[np.int_]:
     quarter = np.mod(angles[:, 0] + 90.0, 360.0)
     is_flip = (quarter > 0.0) & (quarter <= 180.0)
     return np.column_stack([~is_flip, sides[:, 1], sides[:, 0], (angles <= -180.0) | (angles > 180.0)]).astype(int)
+
+
+def are_on_one_circle(p: Array) -> bool:
+    """Whether points in [m], shape (N, 3), are on the circle through the first three, as far as their decimals say."""
+    offset = p - p[0]
+    normal = np.cross(offset[1], offset[2])
+    area = float(np.linalg.norm(normal))
+    if area <= ONE_CIRCLE * float(np.linalg.norm(offset[2])):
+        return False
+    centre = np.linalg.solve([offset[1], offset[2], normal], [*(0.5 * np.sum(offset[1:3] ** 2, axis=1)), 0.0])
+    height = offset @ normal / area
+    radial = np.linalg.norm(offset - centre - height[:, None] * normal / area, axis=1) - np.linalg.norm(centre)
+    return bool(np.hypot(height, radial).max() <= ONE_CIRCLE)
 
 
 def tool_pose(robot: Robot, q: Array) -> Array:

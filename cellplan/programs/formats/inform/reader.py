@@ -14,7 +14,7 @@ from cellplan.programs.elements.corners import LARGEST_SHARE
 from cellplan.programs.elements.paced import ReadMove, rows_of_moves
 from cellplan.programs.elements.text import Statement
 from cellplan.programs.formats.inform.jobs import JobFrame, inform_events, job_names, level_radii, tasks_of
-from cellplan.programs.formats.inform.positions import joints_of
+from cellplan.programs.formats.inform.positions import are_on_one_circle, joints_of
 from cellplan.programs.formats.inform.text import JobFile, JobPosition, read_job
 
 ARC: Final = 3  # motions of an arc: to its start, where the tool is already, through a point, and to its end
@@ -26,6 +26,10 @@ class Motion(NamedTuple):
     statement: Statement
     positions: tuple[JobPosition, ...]  # its end; before it the point through which an arc leads
     level: int  # position level of its end; 0 for a stop
+
+    def behind(self, through: "Motion") -> "Motion":
+        """The motion through a point to its end."""
+        return self._replace(positions=(*through.positions, *self.positions))
 
 
 def read_inform(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
@@ -112,31 +116,46 @@ class _RobotReader:
 
 def motions_of(job: JobFile) -> Iterator[Motion | Statement]:
     """Motions of a job, and its other statements, in their order; each position is used by one motion."""
-    unused = dict(job.positions)
+    unused, statements = dict(job.positions), job.statements
     here: Motion | None = None
+    circle: list[JobPosition] = []  # start, point and end of the arc right before
     is_behind_arc, place = False, 0
-    while place < len(job.statements):
-        statement = job.statements[place]
+    while place < len(statements):
+        statement, kinds = statements[place], [one.kind for one in statements[place : place + 1 + ARC]]
         if statement.kind in {"CALL", ""}:
             yield statement
-            place += 1
+            circle, place = [], place + 1
             continue
         motion = _motion(statement, unused)
-        rest = [inner for inner in job.statements[place + 1 : place + 1 + ARC] if inner.kind == "MOVC"]
-        if is_behind_arc and here and statement.kind == "MOVL" and len(rest) == ARC and _repeats(motion, here):
-            is_behind_arc, place = False, place + 1
+        if is_behind_arc and here and kinds == ["MOVL", *["MOVC"] * ARC] and _repeats(motion, here):
+            is_behind_arc, circle, place = False, [], place + 1
             continue
-        if statement.kind == "MOVC":
-            if here is None or is_behind_arc or len(rest) < ARC - 1 or not _repeats(motion, here):
-                raise statement.error("MOVC to where the tool is, through a point and to the end; MOVL between arcs")
-            through, end = (_motion(inner, unused) for inner in rest[: ARC - 1])
-            if through.level != 1 or {inner.words[1] for inner in rest[: ARC - 1]} != {statement.words[1]}:
-                raise through.statement.error("a point of an arc with PL=1, at the speed of its start")
-            motion, place = end._replace(positions=(*through.positions, *end.positions)), place + ARC - 1
-        here, is_behind_arc, place = motion, statement.kind == "MOVC", place + 1
+        if statement.kind != "MOVC":
+            circle, place = [], place + 1
+        elif circle and here and kinds[1:2] == ["MOVC"]:
+            through, end = motion, _motion(statements[place + 1], unused)
+            _require_one_speed(through, here.statement, end.statement)
+            points = [*circle, through.positions[-1], end.positions[-1]]
+            if not are_on_one_circle(np.array([point.X[:3, 3] for point in points])):
+                raise statement.error("MOVL between arcs of two circles")
+            motion, circle, place = end.behind(through), points[-ARC:], place + 2
+        elif here and not is_behind_arc and kinds[1:ARC] == ["MOVC"] * 2 and _repeats(motion, here):
+            through, end = (_motion(inner, unused) for inner in statements[place + 1 : place + ARC])
+            _require_one_speed(through, statement, end.statement)
+            circle, place = [one.positions[-1] for one in (motion, through, end)], place + ARC
+            motion = end.behind(through)
+        else:
+            raise statement.error("MOVC to where the tool is, through a point and to the end; MOVL between arcs")
+        here, is_behind_arc = motion, bool(circle)
         yield motion
     if unused:
         raise next(iter(unused.values())).statement.error("each position used by one motion", "none that uses it")
+
+
+def _require_one_speed(through: Motion, *others: Statement) -> None:
+    """Refuse a point of an arc that is not passed, and motions of one circle at several speeds."""
+    if through.level != 1 or {one.words[1] for one in others} != {through.statement.words[1]}:
+        raise through.statement.error("a point of an arc with PL=1, at the speed of its start")
 
 
 def _motion(statement: Statement, unused: dict[int, JobPosition]) -> Motion:

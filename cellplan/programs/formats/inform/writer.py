@@ -2,7 +2,8 @@
 
 All positions are poses of the tool with the configuration of the arm, also those of joint motions, as no model knows
 the pulses of an axis. An arc is three motions: to its start, where the tool is already, through a point, and to its
-end; between two arcs stands a line to the point where they meet.
+end; between arcs of two circles stands a line to the point where they meet, and an arc that goes on along the circle of
+the one before has no start.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,13 +31,22 @@ from cellplan.programs.formats.inform.jobs import (
     level_radii,
     speed_text,
 )
-from cellplan.programs.formats.inform.positions import REAR, STATED, WIDTH, configuration, joints_of, tool_pose
+from cellplan.programs.formats.inform.positions import (
+    REAR,
+    STATED,
+    WIDTH,
+    are_on_one_circle,
+    configuration,
+    joints_of,
+    tool_pose,
+)
 from cellplan.programs.formats.inform.reader import read_inform
 from cellplan.programs.formats.inform.text import COMMENT, MOST
 
 DECIMALS: Final = 3  # of a millimetre; degrees have one more
 SAME_JOINTS: Final = 1e-4  # [rad] within which a pose and a configuration must give the joints that are meant
 PASSED: Final = "PL=1"
+ARCS: Final = 5  # points of two arcs that meet
 SHARES: Final = (LARGEST_SHARE, 0.0)  # PL=1 and PL=0 of joints: how far a level rounds is set at each controller
 DATE: Final = "2000/01/01 00:00"  # the same rows give the same bytes
 LINE_END: Final = "\r\n"
@@ -187,7 +197,9 @@ class _RobotWriter:
     def _tool_motions(self, job: _Job, seam: Seam, before: Move, move: Move) -> Iterator[str]:
         """A line, or the motions of an arc."""
         speed = f"V={speed_text(move.feed, seam.task)}"
-        if move.middle is not None:
+        if move.middle is not None and self._goes_on(job, seam, before, move):
+            yield f"MOVC {self._point(job, seam, move.middle)} {speed} {PASSED}"
+        elif move.middle is not None:
             if before.middle is not None:
                 yield f"MOVL {self._point(job, seam, before.row)} {speed} {self._level(before)}"
             yield f"MOVC {self._point(job, seam, before.row)} {speed} {self._level(before)}"
@@ -195,18 +207,28 @@ class _RobotWriter:
         kind = "MOVL" if move.middle is None else "MOVC"
         yield f"{kind} {self._point(job, seam, move.row)} {speed} {self._level(move)}"
 
+    def _goes_on(self, job: _Job, seam: Seam, before: Move, move: Move) -> bool:
+        """Whether an arc goes on along the circle of the one before, with no statement between and as fast."""
+        if before.middle is None or before.feed != move.feed or not job.statements[-1].startswith("MOVC"):
+            return False
+        return are_on_one_circle(
+            np.array([self._pose(job, seam, row)[:3, 3] for row in range(move.row - ARCS + 1, move.row + 1)])
+        )
+
     def _level(self, move: Move) -> str:
         """The position level at the end of a motion."""
         return f"PL={self.levels[move.row]}"
 
     def _point(self, job: _Job, seam: Seam, row: int) -> str:
         """The position of a row of a seam."""
-        q, X_PT = self.rows.q[row], self.rows.X_PT
+        return job.position(self._pose(job, seam, row), self.configurations[row].tolist())
+
+    def _pose(self, job: _Job, seam: Seam, row: int) -> Array:
+        """The tool at a row of a seam, in the frame of its job."""
+        X_PT = self.rows.X_PT
         if row > seam.first and X_PT is not None:
-            X = X_PT[row]
-        else:
-            X = inverse(job.frame.X_WC) @ tool_pose(self.part.placed, q)
-        return job.position(X, self.configurations[row].tolist())
+            return X_PT[row]
+        return inverse(job.frame.X_WC) @ tool_pose(self.part.placed, self.rows.q[row])
 
 
 INFORM: Final = Dialect(
