@@ -23,6 +23,7 @@ from cellplan.model.report.exported import (
 from cellplan.model.robot.controller import ControllerZero
 from cellplan.model.settings.controllers import ControllerEntry, KindName, RobotControlEntry
 from cellplan.model.settings.task import ProcessEntry
+from cellplan.model.task.task import SpacePolylinePath
 from cellplan.programs.seams.shapes import arc, line
 
 ROBOT, TASK, CONTROLLER = "alpha", "seam", "box"
@@ -79,6 +80,7 @@ def seam_job(
     task = replace(
         work(ROBOT),
         name=TASK,
+        path=SpacePolylinePath(points=PLACES[1:5], is_closed=False),
         feed=0.008,
         process=ProcessEntry(feed_mm_s=8.0, on_delay_s=0.3, off_delay_s=0.2),
     )

@@ -11,6 +11,7 @@ from cellplan.errors import InputError, NotVerifiedError, raise_findings, refusa
 from cellplan.files.input.findings import listed
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
+from cellplan.model.report.exported import Moves
 from cellplan.model.report.verified_run import ReadRun, UnsolvedRun, VerifiedRun
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.export.choice import Choice, refuse_unknown_robots
@@ -137,13 +138,18 @@ def refuse_unfit_run(run: ReadRun, formats: Mapping[str, bool], choice: Choice, 
 
 
 def require_settings(cell: Cell, formats: Iterable[str]) -> None:
-    """Require all that a cell has to state for programs in some formats; an ``InputError`` has a line for each."""
+    """Require all that a cell has to state for programs in some formats; an ``InputError`` has a line for each.
+
+    Where a task has a process these are programs of lines, if the format has them: no others begin it.
+    """
     missing: list[InputError] = []
+    has_process = any(task.process is not None for task in cell.tasks)
     for form in formats:
         require_format(form, option="--for")
         dialect = EXPORTERS[form]
         if isinstance(dialect, Dialect):
-            for finding in refusals(partial(refuse_unfit, UnsolvedRun(cell=cell), dialect, EVERYTHING)):
+            choice = Choice(moves=Moves.LINEAR) if has_process and Moves.LINEAR in dialect.moves else EVERYTHING
+            for finding in refusals(partial(refuse_unfit, UnsolvedRun(cell=cell), dialect, choice)):
                 key, _, text = str(finding).partition(": ")
                 is_bare = text == f"expected the controller that plays {form}, got none"
                 cure = f"; state its id, and controllers of kind {listed(dialect.kinds)}" if is_bare else ""

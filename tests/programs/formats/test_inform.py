@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders.elbow_arm import tip
+from builders.scene_builders import work
 from builders.seam_jobs import (
     ARC_AND_WEAVE,
     CONTROLLER,
@@ -20,10 +21,11 @@ from builders.seam_jobs import (
     seam_job,
 )
 
-from cellplan.errors import InputError, NotVerifiedError
+from cellplan.errors import InputError, NotVerifiedError, refusals
 from cellplan.geometry.transforms import pose_from, rotation_exp
-from cellplan.model.report.exported import ExportJob, RobotRows
+from cellplan.model.report.exported import ExportJob, Moves, RobotRows
 from cellplan.model.settings.controllers import ControllerEntry
+from cellplan.model.task.task import SpacePolylinePath
 from cellplan.programs.formats.inform.positions import configuration, joints_of
 from cellplan.programs.formats.inform.writer import INFORM
 from cellplan.programs.judgement.compare_rows import other_rows
@@ -216,6 +218,18 @@ def test_a_corner_that_no_known_level_rounds_so_little_is_refused(levels: tuple[
         INFORM.render(small_corner(levels))
 
 
+@pytest.mark.parametrize(("moves", "is_needed"), [(Moves.LINEAR, True), (Moves.AUTO, False)])
+def test_a_closed_path_in_process_needs_levels_before_anything_is_computed(moves: Moves, is_needed: bool) -> None:
+    """With lines where they can be it may be written by joints."""
+    for path, is_closed in ((work(ROBOT).path, True), (SpacePolylinePath(points=PLACES[1:4], is_closed=False), False)):
+        for levels in ((), (1.0,)):
+            frame = small_corner(levels).frame
+            cell = replace(frame.cell, tasks=(replace(frame.cell.tasks[0], path=path),))
+            findings = list(refusals(*INFORM.demands(replace(frame, cell=cell, moves=moves), 0)))
+            assert len(findings) == (is_needed and is_closed and not levels)
+            assert all("box.position_levels_mm: expected the distances of PL=1" in str(it) for it in findings)
+
+
 @pytest.mark.parametrize(("levels", "level"), [((1.0, 2.0, 5.0), 3), ((2.5, 10.7, 10.8), 2), ((10.0,), 1)])
 def test_a_corner_takes_the_largest_level_that_rounds_no_more_than_it_may(
     levels: tuple[float, ...], level: int
@@ -251,7 +265,7 @@ def test_a_larger_level_is_noticed(level: str, message: str) -> None:
 
 
 def ring_job(*, bulge: float = 0.0, pause: bool = False) -> ExportJob:
-    """A ring in three arcs: the last one may lead through a point outside, by so much in [m], the middle one be idle."""
+    """A ring in three arcs: the last may lead through a point outside, by so much in [m], the middle one be idle."""
     job = inform_job()
     rows, robot = job.programs[0].robots[ROBOT], job.frame.robot(ROBOT)
     angles = np.arange(7) * np.pi / 3.0

@@ -11,7 +11,8 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ExportFrame, Promise, Station
+from cellplan.model.report.exported import ExportFrame, Moves, Promise, Station
+from cellplan.model.task.task import CirclePath, Task
 from cellplan.model.units import MM
 from cellplan.programs.elements.frames import controller_base, require_rest
 from cellplan.programs.elements.handshake import HandshakeStep, signals_by_key
@@ -129,6 +130,8 @@ def demands(frame: ExportFrame, _rows: int = 0) -> Iterator[Callable[[], object]
             for task in frame.cell.tasks:
                 if task.robot == name and task.feed is not None:
                     yield partial(speed_text, task.feed, task.name)
+                if task.robot == name and task.process is not None and frame.moves is not Moves.AUTO:
+                    yield partial(_require_levels, frame, robot, task)
 
 
 def _require_arm(robot: Robot) -> None:
@@ -158,6 +161,18 @@ def _require_frames(frame: ExportFrame, robot: Robot) -> None:
         _require_within(f"robots.{robot.name}.controller.frames", number, FRAMES, "each user frame")
     for station in stations:
         require_rest(robot.name, station)
+
+
+def _require_levels(frame: ExportFrame, robot: Robot, task: Task) -> None:
+    """Refuse a closed path in process, of which no single line or arc is made, where no corner can be rounded."""
+    is_closed = isinstance(task.path, CirclePath) or task.path.is_closed
+    if robot.control is not None and is_closed and not len(level_radii(frame, robot.name)):
+        form = ProcessForm.of(frame.cell.controllers[robot.control.id])
+        if form is not None:
+            raise InputError(
+                f"controllers.{robot.control.id}.position_levels_mm: expected the distances of PL=1, PL=2 and so on as "
+                f"set on the controller, within which the closed path of '{task.name}' is rounded in process, got none"
+            )
 
 
 def _require_within(key: str, number: int | None, bounds: tuple[int, int], what: str) -> None:
