@@ -56,6 +56,7 @@ class Dialect:
     is_proved: bool = False  # whether that time is documented by the maker, not only known from practice
     has_part_targets: bool = False  # whether rows can be poses of tools on the part while robots move in step
     has_seams_in_step: bool = False  # or whether tools then move on lines and arcs in its frame
+    repeats_seams: bool = False  # whether its programs may pass a seam more than once
     moves: tuple[Moves, ...] = (Moves.JOINTS,)  # how its programs can move tools where they work
     # configuration of arms as its targets state it, for joints in [rad] or [m], shape (N, n) to (N, k); an
     # ``InputError`` for an arm that has none. None where targets state none.

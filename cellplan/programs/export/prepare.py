@@ -221,6 +221,12 @@ def unmet_demands(run: AnyRun, dialect: Dialect, frame: ExportFrame, choice: Cho
         if choice.is_thinned:
             yield InputError(f"--thin-mm, --thin-deg: expected no thinning of a timed {dialect.name} program")
         yield from refusals(partial(lead_time, {robot.name: cycle_of(robot) for robot in frame.cell.robots}))
+    cycles = frame.cell.program.cycles
+    if dialect.has_seams(frame) and cycles > 1 and not dialect.repeats_seams:
+        yield InputError(
+            f"program.cycles: expected 1, as {dialect.name} programs of lines pass each seam once, got {cycles}; "
+            "repeat the program on the controller, or write joints (--moves joints)"
+        )
     if frame.promise.waits:
         yield from refusals(*(partial(require_signals, frame, robot.name) for robot in frame.cell.robots))
     rows = max((len(program.times) for program in run_programs(run)), default=0)

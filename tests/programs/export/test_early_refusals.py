@@ -6,17 +6,18 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from builders.seam_jobs import seam_job
 
 from cellplan import open_gate
 from cellplan.cli.main import run as run_command
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.jobs.recover.state import refuse_state
-from cellplan.model.report.exported import Promise
+from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import ReadRun
 from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry, KindName, RobotControlEntry
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.export.choice import Choice
-from cellplan.programs.export.prepare import refuse_unfit
+from cellplan.programs.export.prepare import refuse_unfit, unmet_demands
 from cellplan.programs.export.several import refuse_unfit_run
 
 NAMES = ("left", "right", "idle")
@@ -177,3 +178,14 @@ def test_programs_of_another_run_are_refused_before_that_is_verified(
     err = capsys.readouterr().err
     assert "the programs were made from another run" in err
     assert "certifying" not in err
+
+
+@pytest.mark.parametrize("form", ["rapid", "krl", "fanuc_ls", "inform", "val3", "urscript"])
+def test_programs_of_lines_pass_each_seam_once(form: str, read: ReadRun) -> None:
+    job = seam_job("kuka")
+    cell = job.frame.cell
+    frame = replace(job.frame, cell=replace(cell, program=cell.program.model_copy(update={"cycles": 2})))
+
+    said = [str(error) for error in unmet_demands(read, DIALECTS[form], frame, Choice(moves=Moves.LINEAR))]
+
+    assert any(text.startswith("program.cycles: expected 1,") for text in said) is (form != "fanuc_ls")

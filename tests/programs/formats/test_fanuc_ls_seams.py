@@ -105,6 +105,16 @@ def test_seams_come_back_as_they_were(process, changes) -> None:
     assert np.count_nonzero(read.rounding) == 2 * len(written.seams)
 
 
+def test_a_second_pass_has_no_name_of_another_task() -> None:
+    job = seam_job(passes=2)
+    cell = job.frame.cell
+    other = replace(cell.tasks[0], name=f"{cell.tasks[0].name}_2")
+    job = replace(job, frame=replace(job.frame, cell=replace(cell, tasks=(*cell.tasks, other))))
+
+    assert "ALPHA_WORK_OF_ALPHA_2.ls" not in FANUC_LS.render(job)
+    assert read_back(FANUC_LS, job)[0].robots["alpha"].seams == job.programs[0].robots["alpha"].seams
+
+
 def message(job: ExportJob, old: str, new: str, *, file: str = SEAM) -> str:
     """What is said of a program in which something is replaced."""
     files = FANUC_LS.render(job)

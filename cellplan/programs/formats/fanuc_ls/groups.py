@@ -99,8 +99,8 @@ def tp_programs(frame: ExportFrame, dialect: Dialect) -> list[TpProgram]:
 
 
 def seam_name(program: TpProgram, task: str, number: int) -> str:
-    """Name of the program of a seam, which is passed for the first or a further time."""
-    return program.seams[task] if number == 1 else f"{program.seams[task]}_{number}"
+    """Name of the program of a seam, which is passed for the first or a further time; no other one ends like that."""
+    return program.seams[task] if number == 1 else f"{program.seams[task]}_{number:03d}"
 
 
 def motion_group(frame: ExportFrame, name: str) -> MotionGroup:

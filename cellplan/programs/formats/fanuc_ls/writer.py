@@ -138,6 +138,7 @@ FANUC_LS: Final[Dialect] = Dialect(
     smallest_zone=1.0 / MM,
     split=PAGE,
     moves=tuple(Moves),
+    repeats_seams=True,
     configuration=configuration,
     speeds=percentages,
     demands=demands,
