@@ -142,3 +142,34 @@ def test_only_kuka_numbers_its_machines_and_from_two(connected: Load, kind: str,
         connected(("kind: kuka", f"kind: {kind}"), machine)
 
     assert f"robots.holder.controller.machine: {words}" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "on", "off", "output", "finding"),
+    [
+        ("kuka", "$OUT[5]=TRUE", "$OUT[5]=FALSE", "5", "an output that nothing else on 'c1' uses, got '5'"),
+        ("kuka", "$OUT[0]=TRUE", "$OUT[0]=FALSE", "5", "an output from 1 to 4096"),
+        ("kuka", "$OUT[4097]=TRUE", "$OUT[4097]=FALSE", "5", "an output from 1 to 4096"),
+        ("kuka", "$OUT[6]=TRUE", "$OUT[6]=FALSE", "5", None),
+        ("fanuc", "DO[05]=ON", "DO[05]=OFF", "5", "an output that nothing else on 'c1' uses, got '5'"),
+        ("fanuc", "RO[5]=ON", "RO[5]=OFF", "5", None),
+        ("ur", "set_digital_out(5,True)", "set_digital_out(5,False)", "5", "an output that nothing else on 'c1' uses"),
+        ("ur", "set_tool_digital_out(5,True)", "set_tool_digital_out(5,False)", "5", None),
+        ("staubli", "doGo=true", "doGo=false", "doGo", "an output that nothing else on 'c1' uses, got 'doGo'"),
+        ("yaskawa", "DOUT OT#(5) ON", "DOUT OT#(5) OFF", "5", "an output that nothing else on 'c1' uses, got '5'"),
+    ],
+)
+def test_no_handshake_uses_the_output_of_a_process(
+    connected: Load, kind: str, on: str, off: str, output: str, finding: str | None
+) -> None:
+    changes = (
+        ("kind: kuka}", f"kind: {kind}, process: {{on: '{on}', off: '{off}'}}}}"),
+        ("output: 5", f"output: {output}"),
+    )
+    if finding is None:
+        assert connected(*changes).controllers["c1"].process is not None
+        return
+    with pytest.raises(InvalidFileError) as caught:
+        connected(*changes)
+
+    assert finding in str(caught.value)

@@ -1,5 +1,6 @@
 """Controllers of a cell file: what becomes of their entries, and what contradicts robots or other controllers."""
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Final
 
@@ -9,6 +10,7 @@ from cellplan.files.schema.robot import RobotEntry
 from cellplan.files.yaml.reader import YamlDocument
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
+from cellplan.model.settings.process_statements import read_statement
 from cellplan.model.settings.units import si_or_none
 
 ARM: Final = 6  # axes of an arm, the last ones of a robot with as many joints or more
@@ -18,6 +20,10 @@ SIGNALS: Final = {"kuka": (1, 4096), "ur": (0, 7)}  # first and last number, by 
 FRAMES: Final = {"kuka": 128}  # largest number of a tool or base, by kind
 PART_FRAMES: Final = {**FRAMES, "fanuc": 9}  # likewise of a frame of the part
 WITH_GROUPS: Final = ("fanuc", "yaskawa")
+MOST_OUTPUTS: Final = 9999  # that a statement of a process can name
+OUTPUT: Final = re.compile(
+    r"(?:\$out\[|do\[|ot#\(|set_(?:standard_)?digital_out\()?0*(\w+)[\])]?"
+)  # its name or number
 Uses = dict[tuple[str, str, str], str]  # controller, what, name in lower case -> key path of the first use
 
 
@@ -26,6 +32,7 @@ def control_findings(
 ) -> Iterator[Finding]:
     """Everything about controllers that contradicts a robot, or that two robots claim."""
     uses: Uses = {}
+    yield from _process_outputs(valid, uses, document)
     for name, robot in valid.robots.items():
         path: KeyPath = ("robots", name, "controller")
         yield from _cycle(path, robot, document)
@@ -153,6 +160,21 @@ def _used_twice(path: KeyPath, control: RobotControlEntry, uses: Uses, document:
         if first != place:
             text = f"expected {_article(what)} that nothing else on '{control.id}' uses, got '{word}', as {first} does"
             yield document.finding((*path, *below), text)
+
+
+def _process_outputs(valid: ValidEntries, uses: Uses, document: YamlDocument) -> Iterator[Finding]:
+    """Outputs of a process are those that a kind has; no handshake uses them."""
+    for name, entry in valid.controllers.items():
+        process, (first, last) = entry.process, SIGNALS.get(entry.kind, (1, MOST_OUTPUTS))
+        for key, text in process.statements(on=True).items() if process is not None else ():
+            read = read_statement(entry.kind, text, on=True)
+            output = OUTPUT.fullmatch(read.words["name"]) if read is not None and read.switch.is_output else None
+            if output is None:
+                continue
+            if output[1].isdigit() and not first <= int(output[1]) <= last:
+                words = f"expected an output from {first} to {last}, as controllers of kind {entry.kind} number their "
+                yield document.finding(("controllers", name, "process", "on"), f"{words}signals, got {text!r}")
+            uses[name, "output", output[1]] = f"controllers.{name}.process.{key}"
 
 
 def _article(noun: str) -> str:
