@@ -19,7 +19,7 @@ from cellplan.model.motion.motion import ClockTable
 
 TITLE: Final = "cellplan program clock v1"
 DECIMALS: Final = 9  # [-] of a millimetre of path length
-_NUMBER: Final = r"[0-9]{1,20}(?:\.[0-9]{1,400})?"
+_NUMBER: Final = r"[0-9]{1,20}+(?:\.[0-9]{1,400}+)?+"
 _PHASE: Final = r"[A-Za-z0-9_-]+(?: [A-Za-z0-9_-]+)?"
 _FIXED: Final = ("time_s", "sigma_s", "phase")
 
@@ -57,22 +57,22 @@ def parse_clock(text: str, source: str) -> ClockText:
     tasks = _parse_columns(lines, source)
     rows, gaps = without_gap_lines(lines[4:], source=source, first_line=5)
     pattern = re.compile(rf"{_NUMBER},{_NUMBER},{_PHASE}" + rf"(?:,{_NUMBER},[01]){{{len(tasks)}}}")
-    for index, row in enumerate(rows):
-        if not pattern.fullmatch(row):
-            place = f"{source}:{line_of_row(index, gaps, first_line=5)}"
-            raise InputError(f"{place}: expected {','.join(_column_names(tasks))}, got {row[:60]!r}")
+    if not all(map(pattern.fullmatch, rows)):
+        index, row = next((index, row) for index, row in enumerate(rows) if not pattern.fullmatch(row))
+        place = f"{source}:{line_of_row(index, gaps, first_line=5)}"
+        raise InputError(f"{place}: expected {','.join(_column_names(tasks))}, got {row[:60]!r}")
     if len(rows) < 2:
         raise InputError(f"{source}: expected at least two rows, got {len(rows)}")
-    fields = list(zip(*(row.split(",") for row in rows), strict=True))
-    times, sigma = _numbers(fields[0]), _numbers(fields[1])
+    others = [0, 1, *range(len(_FIXED), len(_FIXED) + 2 * len(tasks))]
+    times, sigma, *columns = np.loadtxt(rows, delimiter=",", comments=None, usecols=others).T.copy()
     for name, column, may_stay in (("time_s", times, False), ("sigma_s", sigma, True)):
         _check_growth(name, column, may_stay=may_stay, gaps=gaps, source=source)
     table = ClockTable(
         times=times,
         sigma=sigma,
-        phases=fields[2],
-        lengths={task: _numbers(fields[3 + 2 * k]) / MM_PER_M for k, task in enumerate(tasks)},
-        process={task: np.array([flag == "1" for flag in fields[4 + 2 * k]]) for k, task in enumerate(tasks)},
+        phases=tuple(row.split(",", len(_FIXED))[2] for row in rows),
+        lengths={task: lengths / MM_PER_M for task, lengths in zip(tasks, columns[::2], strict=True)},
+        process={task: flags == 1.0 for task, flags in zip(tasks, columns[1::2], strict=True)},
         gaps=gaps,
     )
     return ClockText(table=table, cell=cell, program=program, first_line=5)
@@ -108,10 +108,6 @@ def _parse_columns(lines: Sequence[str], source: str) -> tuple[str, ...]:
         expected = ",".join(_column_names(["TASK"]))
         raise InputError(f"{source}:4: expected the column names '{expected}' and so on, got {line[:80]!r}")
     return tasks
-
-
-def _numbers(fields: Sequence[str]) -> Array:
-    return np.array([float(field) for field in fields])
 
 
 def _check_growth(name: str, column: Array, *, may_stay: bool, gaps: dict[int, str], source: str) -> None:

@@ -33,7 +33,7 @@ NO_GAPS: Mapping[int, str] = {}
 
 Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
-_NUMBER = r"-?[0-9]{1,20}(?:\.[0-9]{1,400})?"
+_NUMBER = r"-?[0-9]{1,20}+(?:\.[0-9]{1,400}+)?+"
 _FIELD = re.compile(_NUMBER)
 _UNITS = ("deg", "mm")
 _SHA256 = "sha256 "
@@ -244,8 +244,7 @@ def _parse_rows(lines: list[str], columns: list[str], places: _Places) -> Array:
     row = re.compile(_NUMBER + rf"(?:,{_NUMBER}){{{len(columns) - 1}}}")
     if not all(map(row.fullmatch, lines)):
         raise _first_bad_row(lines, row, columns, places)
-    numbers = np.array(list(map(float, ",".join(lines).split(","))))
-    return numbers.reshape(len(lines), len(columns))
+    return np.loadtxt(lines, delimiter=",", comments=None)
 
 
 def _first_bad_row(lines: Iterable[str], row: re.Pattern[str], columns: list[str], places: _Places) -> InputError:

@@ -222,7 +222,7 @@ def _clock_findings(written: ClockText, clock: ProgramClock, *, cell: Cell, prog
             yield f":{written.line(row)}: {name}: expected {desired[row]} as in the plan of the cell, got {got[row]}"
 
 
-def _columns(table: ClockTable, demanded: ClockTable) -> Iterator[tuple[str, list[object], list[object], Flags]]:
+def _columns(table: ClockTable, demanded: ClockTable) -> Iterator[tuple[str, NDArray[Any], NDArray[Any], Flags]]:
     """Every column with what is written, what is demanded, and where they differ."""
     plain: list[tuple[str, NDArray[Any], NDArray[Any]]] = [
         ("time_s", table.times, demanded.times),
@@ -231,11 +231,11 @@ def _columns(table: ClockTable, demanded: ClockTable) -> Iterator[tuple[str, lis
         *((f"{task}_process", 1 * table.process[task], 1 * process) for task, process in demanded.process.items()),
     ]
     for name, got, desired in plain:
-        yield name, got.tolist(), desired.tolist(), got != desired
+        yield name, got, desired, got != desired
     for task, desired in demanded.lengths.items():
         got_mm, desired_mm = MM_PER_M * table.lengths[task], MM_PER_M * desired
         tolerance = LENGTH_TOL + 1e-9 * np.abs(desired_mm)
-        yield f"{task}_s_mm", got_mm.tolist(), desired_mm.tolist(), ~(np.abs(got_mm - desired_mm) <= tolerance)
+        yield f"{task}_s_mm", got_mm, desired_mm, ~(np.abs(got_mm - desired_mm) <= tolerance)
 
 
 def _gap_findings(gaps: Mapping[int, str], clock: ProgramClock, place: Callable[[int], str]) -> Iterator[str]:
