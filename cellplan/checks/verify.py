@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.checks.clearance.check import UNKNOWN, check_clearance
 from cellplan.checks.clearance.mounting import check_mounting
-from cellplan.checks.clearance.skew import allowed_skew, has_clocks
+from cellplan.checks.clearance.skew import allowed_skew
 from cellplan.checks.clearance.standoff import check_standoffs
 from cellplan.checks.clearance.stops import check_stops, stop_report
 from cellplan.checks.clearance.tool_depth import check_depths
@@ -47,6 +47,7 @@ from cellplan.model.report.report import (
     RobotSpeed,
     TaskAccuracy,
 )
+from cellplan.model.report.skew import has_clocks
 from cellplan.scene.scene import Scene
 
 Clearance = tuple[ClearanceReport, tuple[Check, ...]]

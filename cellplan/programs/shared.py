@@ -9,8 +9,7 @@ import numpy as np
 
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.verified_run import VerifiedRun
-from cellplan.programs.promises.orders import Orders, certified_orders
-from cellplan.programs.promises.run_programs import scenes_of_motions
+from cellplan.programs.promises.orders import Orders, certified_orders, scenes_of_motions
 from cellplan.programs.rows.played import ExecutedProgram
 from cellplan.scene.scene import Scene
 

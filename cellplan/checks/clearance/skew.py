@@ -23,7 +23,7 @@ from cellplan.model.cell.cell import Cell, RobotRows, stacked_positions
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import ToolDepth
-from cellplan.model.report.skew import MOST_SKEW, AllowedSkew, PairSkew, SkewLimit, SkewReport, ToolSkew
+from cellplan.model.report.skew import MOST_SKEW, AllowedSkew, PairSkew, SkewLimit, SkewReport, ToolSkew, clock_groups
 from cellplan.model.task.task import Frame
 from cellplan.scene.scene import Scene
 
@@ -49,12 +49,7 @@ def allowed_skew(
         limits.append(AllowedSkew(limit=SkewLimit.CLEARANCE, skew=shift.shift, subject=bodies, at_s=at_s))
         allowed.append(PairSkew(first=first, second=second, limits=tuple(limits), stated=_stated(cell, first, second)))
     results = tuple(tool.result(cell, float(times[-1])) for tool in tools)
-    return SkewReport(pairs=tuple(allowed), tools=results, groups=_groups(cell))
-
-
-def has_clocks(cell: Cell) -> bool:
-    """Whether a cell states controllers, and its robots are on more than one clock."""
-    return bool(cell.controllers) and len(_groups(cell)) > 1
+    return SkewReport(pairs=tuple(allowed), tools=results, groups=clock_groups(cell))
 
 
 def stands_still(q: Array) -> bool:
@@ -62,18 +57,9 @@ def stands_still(q: Array) -> bool:
     return not np.any(np.ptp(q, axis=0))
 
 
-def _groups(cell: Cell) -> tuple[tuple[str, ...], ...]:
-    """Robots that share a clock, in the order of the cell."""
-    groups: dict[tuple[bool, str], list[str]] = {}
-    for robot in cell.robots:
-        key = (False, robot.name) if robot.control is None else (True, robot.control.id)
-        groups.setdefault(key, []).append(robot.name)
-    return tuple(tuple(group) for group in groups.values())
-
-
 def _apart(cell: Cell) -> Iterator[tuple[str, str]]:
     """Pairs of robots that do not share a clock."""
-    clock = {name: place for place, group in enumerate(_groups(cell)) for name in group}
+    clock = {name: place for place, group in enumerate(clock_groups(cell)) for name in group}
     for first, second in combinations([robot.name for robot in cell.robots], 2):
         if clock[first] != clock[second]:
             yield first, second

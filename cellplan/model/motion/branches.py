@@ -2,8 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
 
 from cellplan.geometry.arrays import Array
+
+SEED_TURN: Final = np.radians(10.0)  # [rad] that a joint of a given start is moved at most: farther, it is a mistake
+SEED_SLIDE: Final = 0.05  # [m] likewise of a joint that slides
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

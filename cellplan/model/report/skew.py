@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from cellplan.model.cell.cell import Cell
+
 MOST_SKEW: Final = 0.2  # [s] up to which an allowed skew is searched
 
 
@@ -101,3 +103,17 @@ class SkewReport:
         Two clocks are then apart by twice as much; half of ``MOST_SKEW`` where it is that or more.
         """
         return 0.5 * self.allowed
+
+
+def has_clocks(cell: Cell) -> bool:
+    """Whether a cell states controllers, and its robots are on more than one clock."""
+    return bool(cell.controllers) and len(clock_groups(cell)) > 1
+
+
+def clock_groups(cell: Cell) -> tuple[tuple[str, ...], ...]:
+    """Robots that share a clock, in the order of the cell."""
+    groups: dict[tuple[bool, str], list[str]] = {}
+    for robot in cell.robots:
+        key = (False, robot.name) if robot.control is None else (True, robot.control.id)
+        groups.setdefault(key, []).append(robot.name)
+    return tuple(tuple(group) for group in groups.values())

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+import numpy as np
+
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Cell, Mode, Robot
 from cellplan.model.motion.plan import Hold, Phase, Role, Transfer
@@ -15,8 +17,10 @@ from cellplan.model.task.task import Task
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.sequence.arrangement import Block, arrange
 from cellplan.planning.sequence.part_moves import PartMove, part_lying, with_move
+from cellplan.planning.timing.schedule import TIME_DECIMALS
 
 HOME: Final = "home"
+WHOLE_STEPS: Final = 1e-9  # [-] share of a step by which a dwell may outlast whole ones: rounding of a quotient
 LEADING: Final = 1e3  # times as much the weights of operators count where the holder moves: it does what it can
 AT_REST: Final = frozenset({Mode.PART_AT_REST, Mode.SEMI_COORDINATED})
 
@@ -30,6 +34,13 @@ class Stage:
     place: PartPlaceEntry | None = None  # where the part lies; None while it is held, or fixed anyway
     move: PartMove | None = None  # the straight move that grips or puts down the part; None in all other stages
     dwell: float | None = None  # time in [s] for which all robots stand; None for a motion
+
+    @property
+    def dwell_times(self) -> Array:
+        """Times of the rows of a dwell in [s], rounded up to whole steps, shape (N,)."""
+        step = self.cell.motion.step
+        count = max(1, int(np.ceil((self.dwell or 0.0) / step - WHOLE_STEPS)))
+        return np.round(np.arange(count + 1) * step, TIME_DECIMALS)
 
 
 def program_stages(cell: Cell) -> tuple[Stage, ...]:

@@ -13,15 +13,13 @@ import numpy as np
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array, rotation_exp
 from cellplan.model.cell.cell import Cell, Grasp, Relation, Robot
-from cellplan.model.motion.branches import MovedStart
+from cellplan.model.motion.branches import SEED_SLIDE, SEED_TURN, MovedStart
 from cellplan.model.task.task import Frame, Task
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.start.given import is_off, part_pose, start_place, tool_distance, tool_error
 from cellplan.planning.start.inverse_kinematics import reaching_configurations
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
-SEED_TURN: Final = np.radians(10.0)  # [rad] that a joint of a given start is moved at most: farther, it is a mistake
-SEED_SLIDE: Final = 0.05  # [m] likewise of a joint that slides
 STEP_LENGTH: Final = 0.01  # [m] by which the tool is led at once
 STEP_ANGLE: Final = np.radians(1.0)  # [rad] likewise
 JUMP: Final = np.radians(15.0)  # [rad] or [m] that a joint moves at most in such a step

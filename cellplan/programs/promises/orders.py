@@ -15,6 +15,7 @@ import numpy as np
 
 from cellplan.certify.free_clocks.free_clocks import ClockRegion, RegionBound, certify_regions
 from cellplan.certify.lever_arms import LeverArms
+from cellplan.certify.run_pairs import scene_of_run
 from cellplan.errors import NotVerifiedError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Cell
@@ -23,8 +24,9 @@ from cellplan.model.report.exported import ProgramRows
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.model.units import MM
 from cellplan.programs.elements.joints import unit_of
-from cellplan.programs.promises.run_programs import RunPhase, RunProgram, run_programs, scenes_of
+from cellplan.programs.promises.run_programs import RunPhase, RunProgram, run_programs
 from cellplan.programs.rows.margins import raised
+from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.runs.plan.program import STILL_TOL
 from cellplan.scene.collision.distance import APART_TOL
 from cellplan.scene.scene import Scene
@@ -90,6 +92,19 @@ def certified_orders(run: VerifiedRun, *, progress: Progress = silent) -> tuple[
         orders.append(Orders(program=program.name, stretches=tuple(stretches), times=times))
     progress(STAGE, 1.0)
     return tuple(orders)
+
+
+def scenes_of_motions(run: VerifiedRun) -> list[Scene]:
+    """The scene of each motion of a run."""
+    return DemandedProgram.of(run.cell).scenes(run.cell)[: len(run.motions)]
+
+
+def scenes_of(run: VerifiedRun) -> list[Scene]:
+    """The scene of each motion of a run, while its tasks are worked on."""
+    return [
+        scene_of_run(scene, [scheduled.task.name for scheduled in motion.schedule.tasks])
+        for scene, motion in zip(scenes_of_motions(run), run.motions, strict=True)
+    ]
 
 
 def certify_written(

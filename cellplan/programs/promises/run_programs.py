@@ -5,17 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cellplan.certify.run_pairs import scene_of_run
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell
-from cellplan.model.report.verified_run import AnyRun, UnsolvedRun, VerifiedRun
+from cellplan.model.report.verified_run import AnyRun, UnsolvedRun
 from cellplan.model.task.task import Frame
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.programs.elements.joints import unit_of
 from cellplan.programs.elements.timed_rows import are_within
-from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.runs.plan.program import STILL_TOL
-from cellplan.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,19 +88,6 @@ def spoilt_by_another_order(cell: Cell, program: RunProgram) -> Iterator[str]:
                 f"{_where(program, spoilt)}: the part moves while the tool of '{work.robot}' is in process ('{task}'): "
                 f"another order spoils the tool path"
             )
-
-
-def scenes_of_motions(run: VerifiedRun) -> list[Scene]:
-    """The scene of each motion of a run."""
-    return DemandedProgram.of(run.cell).scenes(run.cell)[: len(run.motions)]
-
-
-def scenes_of(run: VerifiedRun) -> list[Scene]:
-    """The scene of each motion of a run, while its tasks are worked on."""
-    return [
-        scene_of_run(scene, [scheduled.task.name for scheduled in motion.schedule.tasks])
-        for scene, motion in zip(scenes_of_motions(run), run.motions, strict=True)
-    ]
 
 
 def moving_robots(cell: Cell, program: RunProgram) -> tuple[str, ...]:

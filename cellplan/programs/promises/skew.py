@@ -4,8 +4,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from cellplan.checks.clearance.skew import has_clocks
-from cellplan.model.report.skew import MOST_SKEW, PairSkew
+from cellplan.model.report.skew import MOST_SKEW, PairSkew, has_clocks
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.report.text.notes import demand_text
 from cellplan.report.text.notes import skew_text as report_text

@@ -15,8 +15,8 @@ from cellplan.files.robots.bundled import load_bundled_table
 from cellplan.files.run.manifest import BUNDLED
 from cellplan.files.run.stored import CELL, StoredRun
 from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.branches import SEED_SLIDE, SEED_TURN
 from cellplan.model.units import DEG, MM
-from cellplan.planning.start.seeds import SEED_SLIDE, SEED_TURN
 
 SEARCHED_KEYS: Final = frozenset({"start", "start_deg", "home", "home_deg"})  # ``auto`` where they were to be found
 MOST: Final = 10  # changes of a cell file that are listed

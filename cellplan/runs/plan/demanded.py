@@ -7,7 +7,7 @@ ends and clearance are checked.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -19,12 +19,12 @@ from cellplan.model.motion.motion import Schedule
 from cellplan.model.motion.plan import Phase, Plan
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import Stage, program_stages
 from cellplan.planning.timing.schedule import TIME_DECIMALS, schedule_tasks
 from cellplan.runs.plan.program import ProgramClock
-from cellplan.runs.plan.sequence import dwell_times
-from cellplan.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from cellplan.scene.scene import Scene
 
 RATE_TOL: Final = 1e-9  # [s] by which a step may fall short of the rest in it: nominal times have twelve decimals
 
@@ -73,8 +73,11 @@ class DemandedProgram:
         schedules = [self._schedule(place, steps[place]) for place in range(len(self.plan.phases))]
         return with_nominal_times(ProgramClock.of(cell, self.plan, schedules), written, cell, file=file)
 
-    def scenes(self, cell: Cell) -> list[Scene]:
+    def scenes(self, cell: Cell) -> "list[Scene]":
         """The scene of each phase of the first cycle."""
+        from cellplan.planning.sequence.scenes import StageScenes  # what is refused as read needs none
+        from cellplan.scene.scene import Scene
+
         if not self.stages:
             return [Scene.from_cell(cell)] * len(self.cells)
         made = StageScenes.of(cell)
@@ -104,7 +107,7 @@ class DemandedProgram:
         if stage.phase.tasks:
             return schedule_tasks(stage.cell, [build_toolpath(task, stage.cell.part) for task in stage.cell.tasks])
         if stage.dwell is not None:
-            return Schedule(times=dwell_times(stage), tasks=())
+            return Schedule(times=stage.dwell_times, tasks=())
         times = np.round(np.arange(max(1, steps) + 1) * stage.cell.motion.step, TIME_DECIMALS)
         return Schedule(times=times, tasks=())
 

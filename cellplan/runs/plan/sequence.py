@@ -270,16 +270,9 @@ def _joined(
 
 def _dwelling(stage: Stage, scene: Scene, q: Array) -> PlannedStage:
     """All robots at rest for the time of a dwell, rounded up to whole steps."""
-    times = dwell_times(stage)
+    times = stage.dwell_times
     motion = Motion(times=times, q=np.tile(q, (len(times), 1)))
     return PlannedStage(stage=stage, scene=scene, schedule=Schedule(times=times, tasks=()), motion=motion, rungs={})
-
-
-def dwell_times(stage: Stage) -> Array:
-    """Times of the rows of a dwell in [s], shape (N,)."""
-    step = stage.cell.motion.step
-    count = max(1, int(np.ceil((stage.dwell or 0.0) / step - CLOSED)))
-    return np.round(np.arange(count + 1) * step, TIME_DECIMALS)
 
 
 Pass = tuple[Array, float]  # a stacked configuration, shape (nq,), and the time in [s] for which all stand in it
