@@ -79,8 +79,8 @@ if TYPE_CHECKING:
     from cellplan.model.task.toolpath import Toolpath
     from cellplan.planning.layout_screening import Candidates, Screening
     from cellplan.programs.export.choice import Choice
-    from cellplan.programs.export.program import export_program
-    from cellplan.programs.export.several import Exported, export_programs
+    from cellplan.programs.export.program import export_program, export_programs
+    from cellplan.programs.export.refusals import Exported
     from cellplan.runs.gate.open_gate import open_gate
     from cellplan.runs.solution import Solution
     from cellplan.runs.solve import solve
@@ -125,8 +125,8 @@ _PUBLIC: Final = {  # names by module
     "model.task.toolpath": "Toolpath",
     "planning.layout_screening": "Candidates Screening",
     "programs.export.choice": "Choice",
-    "programs.export.program": "export_program",
-    "programs.export.several": "Exported export_programs",
+    "programs.export.program": "export_program export_programs",
+    "programs.export.refusals": "Exported",
     "runs.gate.open_gate": "open_gate",
     "runs.solution": "Solution",
     "runs.solve": "solve",

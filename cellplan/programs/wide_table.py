@@ -1,6 +1,7 @@
 """The rows of a program with the poses of its tools, for its wide table: of a solution, or of a verified run."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from cellplan.measures.tool_errors import part_poses
 from cellplan.model.cell.cell import Cell
@@ -8,13 +9,15 @@ from cellplan.model.motion.motion import JointTable, Motion, Schedule
 from cellplan.model.report.report import Report
 from cellplan.model.report.verified_run import VerifiedMotion, VerifiedRun
 from cellplan.programs.formats.wide import PhaseRows, WideRows, file_name, read_wide, render_wide
-from cellplan.runs.solution import Solution
 from cellplan.scene.kinematics.screw_chain import ScrewChain
+
+if TYPE_CHECKING:
+    from cellplan.runs.solution import Solution
 
 Checked = tuple[Cell, Schedule, Report]  # a phase: the cell as it is in it, its schedule and its report
 
 
-def solution_rows(solution: Solution) -> WideRows:
+def solution_rows(solution: "Solution") -> WideRows:
     """All rows of a solution, gaps between its phases included."""
     checked = [(run.cell, run.schedule, run.report) for run in solution.runs]
     return _program_rows(solution.cell, solution.motion, checked)

@@ -58,7 +58,7 @@ def _checked(options: CheckOptions, follow: "Callable[[Cell], None]", progress: 
     from cellplan.files.cell.load import load_cell, with_names
     from cellplan.jobs.check import check as check_cell
     from cellplan.jobs.check import check_lines
-    from cellplan.programs.export.several import require_settings
+    from cellplan.programs.export.refusals import require_settings
     from cellplan.runs.overrides import with_overrides
 
     given = load_cell(options.cell, allow_dirs=options.allow_dirs)

@@ -94,15 +94,13 @@ def export(options: ExportOptions) -> Result:
     several each is written or refused by itself; 1 or 2 if one that was named is refused, or all are.
     """
     from cellplan.files.run.folder import PROGRAMS
-    from cellplan.programs.export.program import default_folder, export_program, refuse_choice
-    from cellplan.programs.export.several import (
+    from cellplan.programs.export.exporters import chosen_formats, refuse_choice
+    from cellplan.programs.export.refusals import (
         NothingFitsError,
-        chosen_formats,
-        export_programs,
+        default_folder,
         refuse_unfit_run,
         refuse_unless_writable,
     )
-    from cellplan.programs.export.stored import read_stored_export
     from cellplan.runs.gate.open_gate import open_gate
 
     formats = chosen_formats(options.forms)
@@ -123,6 +121,9 @@ def export(options: ExportOptions) -> Result:
             return result_of_several(nothing.run, folder, nothing.refused)
         if options.escape:
             return _escapes(run, folder, formats, choice, progress)
+        from cellplan.programs.export.program import export_program, export_programs
+        from cellplan.programs.export.stored import read_stored_export
+
         if single:
             files = export_program(run, folder, form=single, choice=choice, progress=progress)
             return result_of_one(run, folder, single, files=list(files), record=read_stored_export(folder).record)

@@ -10,7 +10,7 @@ from cellplan.errors import ExitStatus, InputError
 
 if TYPE_CHECKING:
     from cellplan.model.report.verified_run import ReadRun, VerifiedRun
-    from cellplan.programs.export.several import Exported
+    from cellplan.programs.export.refusals import Exported
 
 SCHEMA: Final = "cellplan.exported/1"
 

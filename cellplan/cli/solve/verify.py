@@ -87,7 +87,7 @@ def _verified_run(options: VerifyOptions) -> Result:
 def _verified_programs(options: VerifyOptions) -> Result:
     """Verify a folder of exported programs against the run that they were made from."""
     from cellplan.jobs.recover.escape import verify_escape
-    from cellplan.programs.export.program import require_format
+    from cellplan.programs.export.exporters import require_format
     from cellplan.programs.export.stored import read_stored_export, refuse_other_run, run_of_export
     from cellplan.programs.export.verify_export import verify_export
     from cellplan.runs.gate.open_gate import open_gate

@@ -26,9 +26,10 @@ from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.joints import Angle, exact_numbers
 from cellplan.programs.elements.text import comment
 from cellplan.programs.export.choice import Choice
+from cellplan.programs.export.exporters import exporter_of
 from cellplan.programs.export.notes import READ_BACK
 from cellplan.programs.export.prepare import PreparedExport, prepare
-from cellplan.programs.export.program import exporter_of, write_export
+from cellplan.programs.export.program import write_export
 from cellplan.programs.export.record import Record, export_record
 from cellplan.programs.export.stored import StoredExport, refuse_other_run
 from cellplan.programs.export.verify_export import VerifiedExport

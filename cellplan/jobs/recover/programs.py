@@ -22,9 +22,9 @@ from cellplan.programs.elements.handshake import speakers
 from cellplan.programs.elements.joints import in_step
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import Choice, exported_robots
+from cellplan.programs.export.exporters import require_format
 from cellplan.programs.export.notes import READ_BACK
-from cellplan.programs.export.prepare import is_at_cycle, unmet_demands
-from cellplan.programs.export.program import require_format
+from cellplan.programs.export.refusals import is_at_cycle, unmet_demands
 from cellplan.programs.judgement.compare_rows import other_rows
 from cellplan.programs.promises.promises import controllers_of, waits
 from cellplan.programs.rows.interpolant import HermiteRows, resting, row_velocities

@@ -2,26 +2,24 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Final
 
-from cellplan.errors import InputError, InvalidFileError, LineRefusedError, NotVerifiedError, raise_findings, refusals
+from cellplan.errors import InputError, LineRefusedError, NotVerifiedError, raise_findings
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, ProgramRows, Promise
-from cellplan.model.report.verified_run import AnyRun, ReadRun, UnsolvedRun, VerifiedRun
+from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.model.units import DEG, MM
 from cellplan.programs.elements.corners import units_of
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.handshake import require_signals, speakers
+from cellplan.programs.elements.handshake import speakers
 from cellplan.programs.elements.joints import in_step
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import THIN_DEG, THIN_MM, Choice, exported_robots
+from cellplan.programs.export.refusals import frame_of, is_at_cycle, unmet_demands
 from cellplan.programs.judgement.round_rows import stops_left, with_rounding
 from cellplan.programs.promises.orders import Orders
 from cellplan.programs.promises.promises import Promised, choose_promise, controllers_of
-from cellplan.programs.promises.run_programs import run_programs
 from cellplan.programs.promises.skew import RunSkew, run_skew
-from cellplan.programs.promises.stations import stations
 from cellplan.programs.rows.feeds import feeds_in_step
 from cellplan.programs.rows.part_targets import with_part_poses
 from cellplan.programs.rows.resample import lead_time, resampled
@@ -170,69 +168,6 @@ def _moved_by_joints(frame: ExportFrame, by_joints: Mapping[str, str]) -> Iterat
         yield f"task '{task}' moves by joints, at no programmed speed{without}: {reason}"
 
 
-def frame_of(run: AnyRun, dialect: Dialect, robots: Sequence[str], promise: Promise, choice: Choice) -> ExportFrame:
-    """What a reader may know of an export of a run."""
-    frame = ExportFrame(
-        cell=run.cell,
-        robots=tuple(robots),
-        programs=tuple(program.name for program in run_programs(run)),
-        promise=promise,
-        moves=choice.moves,
-        split=choice.split,
-    )
-    if isinstance(run, UnsolvedRun) or not dialect.has_seams(frame):
-        return frame
-    return replace(frame, stations=stations(run))
-
-
-def refuse_unfit(run: ReadRun | UnsolvedRun, dialect: Dialect, choice: Choice) -> None:
-    """Refuse an export of which the files of a run, or a cell, say already that it cannot be.
-
-    Raises:
-        InputError: All that is not stated in the cell, or does not fit.
-        NotVerifiedError: No promise of the format can be kept with this motion.
-    """
-    choice.refuse_for(dialect)
-    unmet = list(refusals(partial(exported_robots, run.cell, dialect, choice.robots)))
-    chosen = choice.robots or [robot.name for robot in run.cell.robots]
-    robots = tuple(robot.name for robot in run.cell.robots if robot.control is None and robot.name in chosen)
-    if not unmet:
-        robots = exported_robots(run.cell, dialect, choice.robots)
-    elif not robots:  # or else what those need that have no controller yet is said too
-        raise_findings(unmet)
-    usual = dialect.promises[0 if dialect.most_arms is None else -1]  # arms of controllers that are not known yet
-    best = promise = choice.promise or usual
-    try:
-        best = choose_promise(run, dialect, robots, requested=choice.promise, moves=choice.moves).promise
-    except InputError as error:
-        unmet += error.findings if isinstance(error, InvalidFileError) else [error]
-    except NotVerifiedError as error:
-        raise_findings(unmet)
-        frame = frame_of(run, dialect, robots, choice.promise or dialect.promises[-1], choice)
-        needed = {f"  needed too: {finding}": None for finding in unmet_demands(run, dialect, frame, choice)}
-        raise NotVerifiedError([*error.findings, *needed]) from None
-    frame = frame_of(run, dialect, robots, promise if unmet else best, choice)
-    raise_findings([*unmet, *unmet_demands(run, dialect, frame, choice)])
-
-
-def unmet_demands(run: AnyRun, dialect: Dialect, frame: ExportFrame, choice: Choice) -> Iterator[InputError]:
-    """All that a format still needs of a cell, and choices that do not go with what is promised."""
-    if is_at_cycle(dialect, frame.promise):
-        if choice.is_thinned:
-            yield InputError(f"--thin-mm, --thin-deg: expected no thinning of a timed {dialect.name} program")
-        yield from refusals(partial(lead_time, {robot.name: cycle_of(robot) for robot in frame.cell.robots}))
-    cycles = frame.cell.program.cycles
-    if dialect.has_seams(frame) and cycles > 1 and not dialect.repeats_seams:
-        yield InputError(
-            f"program.cycles: expected 1, as {dialect.name} programs of lines pass each seam once, got {cycles}; "
-            "repeat the program on the controller, or write joints (--moves joints)"
-        )
-    if frame.promise.waits:
-        yield from refusals(*(partial(require_signals, frame, robot.name) for robot in frame.cell.robots))
-    rows = max((len(program.times) for program in run_programs(run)), default=0)
-    yield from refusals(lambda: raise_findings(refusals(*dialect.demands(frame, rows))))
-
-
 def _shaped(
     shared: Shared, dialect: Dialect, choice: Choice, *, frame: ExportFrame, orders: Sequence[Orders]
 ) -> tuple[tuple[ProgramRows, ...], float]:
@@ -254,11 +189,6 @@ def _shaped(
             for program, rows in zip(programs, rows_of_run, strict=True)
         )
     return tuple(_only(program, frame.robots) for program in programs), 0.0
-
-
-def is_at_cycle(dialect: Dialect, promise: Promise) -> bool:
-    """Whether the rows of an export lie on the cycle of the controller."""
-    return dialect.at_cycle and promise is Promise.TIMED
 
 
 def thinning_of(dialect: Dialect, promise: Promise, choice: Choice) -> tuple[float, float] | None:

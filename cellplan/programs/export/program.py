@@ -1,89 +1,29 @@
-"""Export: from a verified run to programs for controllers, judged once more as they were read back from their text."""
+"""Export: from a verified run to programs for controllers, judged once more as they were read back from their text.
 
-from collections import ChainMap
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+Of several formats at once, what all of them need of the run is worked out once, and each is all or nothing.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from cellplan.cache import without_cache
 from cellplan.checks.verify import verify_motion, with_clearance
 from cellplan.errors import InputError, NotVerifiedError
-from cellplan.files.input.findings import did_you_mean, listed
-from cellplan.files.run.folder import EXPORT, PROGRAMS, RunFolder, refuse_unless_replaceable
+from cellplan.files.run.folder import EXPORT, RunFolder
 from cellplan.model.motion.motion import JointTable
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.verified_run import VerifiedMotion, VerifiedRun
-from cellplan.programs.dialects import DIALECTS, ESCAPES
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.escapes import with_register
-from cellplan.programs.export.choice import Choice
+from cellplan.programs.export.choice import Choice, refuse_unknown_robots
+from cellplan.programs.export.exporters import ALL, chosen_formats, exporter_of, refuse_choice, require_format
 from cellplan.programs.export.prepare import prepare
 from cellplan.programs.export.record import Record, export_record, record_text, table_record
+from cellplan.programs.export.refusals import EVERYTHING, Exported, refuse_unless_exportable, refuse_unless_writable
 from cellplan.programs.export.written import write
-from cellplan.programs.formats.csv import DECIMALS as CSV_DECIMALS
 from cellplan.programs.shared import Shared
-from cellplan.programs.wide_table import read_wide_tables, render_wide_tables
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Exporter:
-    """A format that is no program of single robots: it is made from all of a run."""
-
-    render: Callable[[VerifiedRun], dict[str, str]]  # text of every file of a run, by its path in the folder
-    # what a reader of its own finds in these files: the tables of each motion, by robot
-    read: Callable[[VerifiedRun, Mapping[str, str]], tuple[dict[str, JointTable], ...]]
-    decimals: int  # of a second, degree or millimetre in these files
-
-
-TABLES: Final[dict[str, Exporter]] = {
-    "wide": Exporter(render=render_wide_tables, read=read_wide_tables, decimals=CSV_DECIMALS),
-}
-EXPORTERS: Final[Mapping[str, Dialect | Exporter]] = ChainMap(TABLES, DIALECTS)  # type: ignore[arg-type]
-
-
-def require_format(name: str, *, option: str = "--format") -> None:
-    """Refuse a format that does not exist; messages name the option that it belongs to."""
-    if name not in EXPORTERS:
-        hint = did_you_mean(name, EXPORTERS)
-        raise InputError(f"{option}: expected one of {listed(EXPORTERS)}, got '{name}'{hint}")
-
-
-def exporter_of(form: str, choice: Choice) -> Dialect | Exporter:
-    """What writes and reads a format as it is chosen; ``InputError`` where it has no step registers."""
-    dialect = EXPORTERS[form]
-    if not choice.steps:
-        return dialect
-    if form not in ESCAPES or not isinstance(dialect, Dialect):
-        raise InputError(f"--escape: expected one of the formats {listed(ESCAPES)}, got {form}")
-    return with_register(dialect, ESCAPES[form])
-
-
-def refuse_choice(form: str, choice: Choice) -> None:
-    """Refuse what a format cannot do whatever the run; call it early, before any long work."""
-    dialect = exporter_of(form, choice)
-    if isinstance(dialect, Dialect):
-        choice.refuse_for(dialect)
-    elif choice != Choice():
-        raise InputError(f"--format: expected no choice of robots, rows or targets with {form}, a table of all robots")
-
-
-def default_folder(run: Path, form: str) -> Path:
-    """Where programs are written by default: inside the run folder."""
-    return run / PROGRAMS / form
-
-
-def refuse_unless_exportable(folder: Path, run: Path) -> None:
-    """Refuse what is part of the run, holds it, or holds anything but an export; call it before any long work."""
-    place, source = folder.resolve(), run.resolve()
-    inside = place.relative_to(source).parts if place.is_relative_to(source) else None
-    if source.is_relative_to(place) or (inside is not None and (len(inside) < 2 or inside[0] != PROGRAMS)):
-        raise InputError(f"{folder}: expected a folder outside the run, or below '{run / PROGRAMS}'")
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / EXPORT).is_file():
-        raise InputError(f"{folder}: contains files other than exported programs; choose another folder")
-    refuse_unless_replaceable(folder)
 
 
 def export_program(
@@ -119,6 +59,60 @@ def export_program(
         files, record = exported(run, form, choice or Choice(), progress=progress)
     write_export(folder, files, record)
     return tuple(files)
+
+
+def export_programs(
+    run: VerifiedRun,
+    folder: Path,
+    *,
+    formats: Sequence[str] = (ALL,),
+    choice: Choice = EVERYTHING,
+    progress: Progress = silent,
+) -> tuple[Exported, ...]:
+    """Write the programs of a verified run in several formats, each in a folder of its own: ``folder/csv`` and so on.
+
+    What holds of the run whatever the format is worked out once, and rows that are read back alike from two formats, to
+    the last bit, are judged once. A format that cannot take the run is refused and does not keep others from being
+    written; whether that is an error is for the caller to say.
+
+    Args:
+        run: The verified run.
+        folder: Where the folders of the formats go; older exports in these are replaced.
+        formats: Names of formats; ``all`` for every one there is.
+        choice: What of the run, and how; a format that cannot hold it is refused.
+        progress: Called with the stage and the fraction done.
+
+    Returns:
+        What came of each format, in the order in which they were asked for.
+
+    Raises:
+        InputError: There is no such format or robot, or a folder must not or cannot be written.
+    """
+    chosen = chosen_formats(formats)
+    refuse_unless_writable([folder / form for form in chosen], run.folder)
+    refuse_unknown_robots(run.cell, choice.robots)
+    with without_cache():  # a proof rests on the files themselves
+        return tuple(_exports(Shared(run), folder, chosen, choice, progress))
+
+
+def _exports(
+    shared: Shared, folder: Path, formats: Mapping[str, bool], choice: Choice, progress: Progress
+) -> Iterator[Exported]:
+    """What comes of each format."""
+    for form, is_named in formats.items():
+        place = folder / form
+        try:
+            files, record = exported(shared.run, form, choice, shared=shared, progress=_of(form, progress))
+        except (InputError, NotVerifiedError) as refusal:
+            yield Exported(form=form, folder=place, is_named=is_named, refusal=refusal)
+            continue
+        write_export(place, files, record)
+        yield Exported(form=form, folder=place, is_named=is_named, files=tuple(files), record=record)
+
+
+def _of(form: str, progress: Progress) -> Progress:
+    """Progress that names the format."""
+    return lambda stage, share: progress(f"{form}: {stage}", share)
 
 
 def write_export(folder: Path, files: Mapping[str, str], record: Record) -> None:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -12,13 +12,13 @@ from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.model.units import MM
 from cellplan.programs.export.notes import deviation_line, deviation_records, skew_lines
 from cellplan.programs.export.prepare import PreparedExport
+from cellplan.programs.export.stored import SCHEMA
 from cellplan.programs.export.written import Written
 from cellplan.programs.promises.orders import Orders, OrderStretch
 from cellplan.programs.promises.skew import PER_SECOND
 from cellplan.report.record.sections.rests_on import zero_text
 from cellplan.runs.write_run import versions
 
-SCHEMA: Final = "cellplan.programs.formats/2"
 Record = dict[str, Any]
 
 

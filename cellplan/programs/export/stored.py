@@ -13,10 +13,10 @@ from cellplan.files.run.folder import EXPORT, MANIFEST
 from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import ReadRun, VerifiedRun
 from cellplan.programs.export.choice import Choice
-from cellplan.programs.export.record import SCHEMA
 
 Word = TypeVar("Word", Promise, Moves)
 
+SCHEMA: Final = "cellplan.programs.formats/2"
 SIZE_LIMIT: Final = 50_000_000  # [bytes] of a record: marks of many phases
 FILE_LIMIT: Final = 2_000_000_000  # [bytes] of a program
 IGNORED: Final = ".DS_Store"  # put into every folder by the file manager of one system

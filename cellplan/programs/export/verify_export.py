@@ -13,9 +13,11 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.export.choice import Choice
-from cellplan.programs.export.prepare import frame_of, prepare
-from cellplan.programs.export.program import EXPORTERS, exporter_of, require_format, verify_rounded
+from cellplan.programs.export.exporters import EXPORTERS, exporter_of, require_format
+from cellplan.programs.export.prepare import prepare
+from cellplan.programs.export.program import verify_rounded
 from cellplan.programs.export.record import export_record, table_record
+from cellplan.programs.export.refusals import frame_of
 from cellplan.programs.export.stored import StoredExport, refuse_other_run
 from cellplan.programs.export.written import judged, with_notes
 from cellplan.programs.shared import Shared

@@ -12,7 +12,8 @@ from cellplan.model.report.exported import ExportJob, ProgramRows, Promise, Robo
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.notes import export_notes
-from cellplan.programs.export.prepare import PreparedExport, is_at_cycle
+from cellplan.programs.export.prepare import PreparedExport
+from cellplan.programs.export.refusals import is_at_cycle
 from cellplan.programs.judgement.judge import Judgement, judge, played_programs
 from cellplan.programs.promises.orders import certify_written
 from cellplan.programs.rows.margins import robot_corners

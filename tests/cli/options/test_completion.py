@@ -14,7 +14,7 @@ from cellplan.files.robots.bundled import bundled_names
 from cellplan.model.cell.cell import Mode
 from cellplan.model.report.exported import Moves
 from cellplan.model.solver import METHODS, Integrator
-from cellplan.programs.export.program import EXPORTERS
+from cellplan.programs.export.exporters import EXPORTERS
 from cellplan.search.programs.objective import CycleTiming, Objective
 
 

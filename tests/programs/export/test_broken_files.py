@@ -17,7 +17,7 @@ from builders.vendor_cells import solve_into, write_cell
 from cellplan import VerifiedRun, export_program, open_gate
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.files.input.files import digest
-from cellplan.programs.export.program import EXPORTERS
+from cellplan.programs.export.exporters import EXPORTERS
 from cellplan.programs.export.stored import read_stored_export
 from cellplan.programs.export.verify_export import verify_export
 

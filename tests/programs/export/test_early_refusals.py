@@ -17,8 +17,7 @@ from cellplan.model.report.verified_run import ReadRun
 from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry, KindName, RobotControlEntry
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.export.choice import Choice
-from cellplan.programs.export.prepare import refuse_unfit, unmet_demands
-from cellplan.programs.export.several import refuse_unfit_run
+from cellplan.programs.export.refusals import refuse_unfit, refuse_unfit_run, unmet_demands
 
 NAMES = ("left", "right", "idle")
 

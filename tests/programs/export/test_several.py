@@ -12,9 +12,9 @@ from cellplan import Exported, VerifiedRun, export_program, export_programs, ope
 from cellplan.errors import InputError
 from cellplan.model.report.exported import Interpolation, ProgramRows, RobotRows
 from cellplan.programs.dialects import DIALECTS
-from cellplan.programs.export import several
+from cellplan.programs.export import program
 from cellplan.programs.export.choice import Choice
-from cellplan.programs.export.program import EXPORTERS
+from cellplan.programs.export.exporters import EXPORTERS
 from cellplan.programs.judgement import judge as judging
 from cellplan.programs.rows.rows import full_rows
 from cellplan.programs.shared import Shared
@@ -180,7 +180,7 @@ def test_what_is_worked_out_for_several_formats_is_forgotten_between_calls(
         made.append(Shared(of))
         return made[-1]
 
-    monkeypatch.setattr(several, "Shared", making)
+    monkeypatch.setattr(program, "Shared", making)
     for name in ("first", "second"):
         export_programs(run, tmp_path / name, formats=["csv", "json"])
 

@@ -22,7 +22,7 @@ from cellplan.model.report.exported import ExportJob
 from cellplan.model.report.verified_run import ACCESS_TOKEN, VerifiedRun
 from cellplan.model.solver import Integrator
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.export.program import EXPORTERS
+from cellplan.programs.export.exporters import EXPORTERS
 from cellplan.runs.overrides import with_overrides
 
 pytestmark = pytest.mark.usefixtures("stored_solutions")
