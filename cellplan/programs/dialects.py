@@ -1,33 +1,40 @@
 """All program formats by name: each stands in a file or folder of its own in ``cellplan.programs.formats``."""
 
-from collections.abc import Mapping
-from typing import Final
+from collections import UserDict
+from collections.abc import MutableMapping
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, Final
 
-from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.escapes import EscapeForm
-from cellplan.programs.formats.csv import CSV
-from cellplan.programs.formats.fanuc_ls.escape import TP_ESCAPE
-from cellplan.programs.formats.fanuc_ls.writer import FANUC_LS
-from cellplan.programs.formats.inform.writer import INFORM
-from cellplan.programs.formats.json_tables import JSON
-from cellplan.programs.formats.krl.escape import KRL_ESCAPE
-from cellplan.programs.formats.krl.writer import KRL
-from cellplan.programs.formats.rapid.escape import RAPID_ESCAPE
-from cellplan.programs.formats.rapid.writer import RAPID
-from cellplan.programs.formats.ros2.writer import ROS2
-from cellplan.programs.formats.stream.writer import STREAM
-from cellplan.programs.formats.urscript.escape import URSCRIPT_ESCAPE
-from cellplan.programs.formats.urscript.writer import URSCRIPT
-from cellplan.programs.formats.val3.escape import VAL3_ESCAPE
-from cellplan.programs.formats.val3.writer import VAL3
+if TYPE_CHECKING:
+    from cellplan.programs.elements.dialect import Dialect
+    from cellplan.programs.elements.escapes import EscapeForm
 
-DIALECTS: Final[Mapping[str, Dialect]] = {
-    dialect.name: dialect for dialect in (CSV, FANUC_LS, INFORM, JSON, KRL, RAPID, ROS2, STREAM, URSCRIPT, VAL3)
-}
-ESCAPES: Final[Mapping[str, EscapeForm]] = {
-    "fanuc_ls": TP_ESCAPE,
-    "krl": KRL_ESCAPE,
-    "rapid": RAPID_ESCAPE,
-    "urscript": URSCRIPT_ESCAPE,
-    "val3": VAL3_ESCAPE,
-}
+
+class _Formats(UserDict[str, Any]):
+    """Objects by the name of their format; one that is stated by its place in ``formats`` is imported for its use."""
+
+    def __getitem__(self, name: str) -> Any:
+        if isinstance(place := self.data[name], str):
+            self.data[name] = resolve_name(f"cellplan.programs.formats.{place}")
+        return self.data[name]
+
+
+DIALECTS: Final["MutableMapping[str, Dialect]"] = _Formats(
+    csv="csv:CSV",
+    fanuc_ls="fanuc_ls.writer:FANUC_LS",
+    inform="inform.writer:INFORM",
+    json="json_tables:JSON",
+    krl="krl.writer:KRL",
+    rapid="rapid.writer:RAPID",
+    ros2="ros2.writer:ROS2",
+    stream="stream.writer:STREAM",
+    urscript="urscript.writer:URSCRIPT",
+    val3="val3.writer:VAL3",
+)
+ESCAPES: Final["MutableMapping[str, EscapeForm]"] = _Formats(
+    fanuc_ls="fanuc_ls.escape:TP_ESCAPE",
+    krl="krl.escape:KRL_ESCAPE",
+    rapid="rapid.escape:RAPID_ESCAPE",
+    urscript="urscript.escape:URSCRIPT_ESCAPE",
+    val3="val3.escape:VAL3_ESCAPE",
+)

@@ -1,6 +1,6 @@
 """Verified run: controller programs are made from nothing else."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -15,23 +15,20 @@ ACCESS_TOKEN: Final = object()  # known to ``open_gate`` only
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReadMotion:
-    """One phase of a run that was read and not verified."""
-
-    name: str | None  # name of the phase among several; None for the only one of a program
-    schedule: Schedule  # desired tool poses
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReadRun:
     """What the files of a run say before anything in them is verified: enough to refuse what cannot be done with it."""
 
     folder: Path  # the run folder
     digest: str  # SHA-256 of its manifest
     cell: Cell  # the cell that was solved
-    motion: Motion  # all rows of the program
-    motions: tuple[ReadMotion, ...]  # one for each phase
+    motions: tuple[str, ...]  # names of its phases, empty for the only one
+    rows: Callable[[], Motion]  # reads all rows of the program, once: many refusals need none of them
     names: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of files of other names than those of the run
+
+    @property
+    def motion(self) -> Motion:
+        """All rows of the program; an ``InputError`` has file and line where they are not those of the cell."""
+        return self.rows()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

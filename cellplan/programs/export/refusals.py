@@ -17,7 +17,7 @@ from cellplan.programs.elements.handshake import require_signals
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import Choice, exported_robots, refuse_unknown_robots
 from cellplan.programs.export.exporters import EXPORTERS, exporter_of, refuse_choice, require_format
-from cellplan.programs.promises.promises import choose_promise
+from cellplan.programs.promises.promises import require_promise
 from cellplan.programs.promises.run_programs import run_programs
 from cellplan.programs.promises.stations import stations
 from cellplan.programs.rows.resample import lead_time
@@ -161,7 +161,7 @@ def refuse_unfit(run: ReadRun | UnsolvedRun, dialect: Dialect, choice: Choice) -
     usual = dialect.promises[0 if dialect.most_arms is None else -1]  # arms of controllers that are not known yet
     best = promise = choice.promise or usual
     try:
-        best = choose_promise(run, dialect, robots, requested=choice.promise, moves=choice.moves).promise
+        best = require_promise(run, dialect, robots, requested=choice.promise, moves=choice.moves)
     except InputError as error:
         unmet += error.findings if isinstance(error, InvalidFileError) else [error]
     except NotVerifiedError as error:

@@ -89,14 +89,28 @@ def choose_promise(
             can hold, indented ones say why not the better ones.
     """
     export = _Export(run=run, dialect=dialect, robots=tuple(robots), skew=skew, requested=requested, moves=moves)
-    failures: dict[Promise, _Against] = {}
+    promise, failures = _best(export)
+    reasons = tuple(f"not {better}: {reason.text}" for better, reason in failures.items())
+    return Promised(promise=promise, reasons=reasons, remarks=tuple(_remarks(export, promise)))
+
+
+def require_promise(
+    run: AnyRun, dialect: Dialect, robots: Sequence[str], *, requested: Promise | None, moves: Moves
+) -> Promise:
+    """The promise of ``choose_promise`` alone, as far as it does not depend on skews."""
+    export = _Export(run=run, dialect=dialect, robots=tuple(robots), skew=None, requested=requested, moves=moves)
+    return _best(export)[0]
+
+
+def _best(export: _Export) -> tuple[Promise, dict[Promise, _Against]]:
+    """The best promise that can be kept, and what is against better ones; errors as those of ``choose_promise``."""
+    dialect, failures = export.dialect, dict[Promise, _Against]()
     for promise in BEST_FIRST:
-        if promise is Promise.PACED and (moves is Moves.JOINTS or promise not in dialect.promises):
+        if promise is Promise.PACED and (export.moves is Moves.JOINTS or promise not in dialect.promises):
             continue  # joints have no speed of a tool
         against = _against(export, promise)
         if against is None:
-            reasons = tuple(f"not {better}: {reason.text}" for better, reason in failures.items())
-            return Promised(promise=promise, reasons=reasons, remarks=tuple(_remarks(export, promise)))
+            return promise, failures
         failures[promise] = against
     unstated = [against.text for against in failures.values() if against.is_input]
     if unstated:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 
 from cellplan.cache import without_cache
@@ -10,7 +11,7 @@ from cellplan.files.input.findings import listed
 from cellplan.files.run.stored import CELL, StoredRun, read_stored_run
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report.verified_run import ACCESS_TOKEN, ReadMotion, ReadRun, VerifiedRun
+from cellplan.model.report.verified_run import ACCESS_TOKEN, ReadRun, VerifiedRun
 from cellplan.planning.modes import homeless
 from cellplan.runs.gate.stored_cell import load_stored_cell
 from cellplan.runs.gate.stored_rows import StoredRows, read_rows
@@ -37,7 +38,7 @@ def open_gate(
         cell: The cell file that was solved; None when it is not available.
         controllers: A file of names of tasks, signals, tools and frames that take the place of those of the cell.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
-        refuse: Called when all is read and before anything is verified; raises what speaks against the use of the run.
+        refuse: Called when the cell is read and before anything is verified; raises what speaks against the use.
         progress: Called with the stage and the fraction done.
 
     Raises:
@@ -48,11 +49,12 @@ def open_gate(
     _refuse_failed(stored)
     source = load_stored_cell(stored, cell=cell, allow_dirs=allow_dirs, controllers=controllers)
     demanded = _demanded(source.cell, stored)
-    rows = read_rows(stored, source.cell, demanded)
+    read = cache(partial(read_rows, stored, source.cell, demanded))
     if refuse is not None:
-        refuse(replace(_read_run(stored, source.cell, demanded, rows), names=source.names))
+        refuse(replace(_read_run(stored, source.cell, demanded, read), names=source.names))
     from cellplan.runs.gate.verified_rows import verified_rows  # what is refused until here needs none of it
 
+    rows = read()
     motions, remarks = verified_rows(rows, source.cell, progress=progress)
     return VerifiedRun(
         folder=stored.folder,
@@ -76,14 +78,13 @@ def read_run(stored: StoredRun, cell: Cell) -> ReadRun:
     """
     _refuse_failed(stored)
     demanded = _demanded(cell, stored)
-    return _read_run(stored, cell, demanded, read_rows(stored, cell, demanded))
+    return _read_run(stored, cell, demanded, cache(partial(read_rows, stored, cell, demanded)))
 
 
-def _read_run(stored: StoredRun, cell: Cell, demanded: DemandedProgram, rows: StoredRows) -> ReadRun:
+def _read_run(stored: StoredRun, cell: Cell, demanded: DemandedProgram, read: Callable[[], StoredRows]) -> ReadRun:
     """The run as it is before anything is verified."""
-    phases = zip(demanded.plan.program[: len(demanded.cells)], rows.clock.schedules, strict=False)
-    motions = tuple(ReadMotion(name=phase.label, schedule=schedule) for phase, schedule in phases)
-    return ReadRun(folder=stored.folder, digest=stored.digest, cell=cell, motion=rows.motion, motions=motions)
+    labels = tuple(demanded.labels)
+    return ReadRun(folder=stored.folder, digest=stored.digest, cell=cell, motions=labels, rows=lambda: read().motion)
 
 
 def _refuse_failed(stored: StoredRun) -> None:

@@ -8,13 +8,13 @@ import pytest
 from builders.scene_builders import fixed_part, held_part, make_cell, placed, schedule, slide_model, work
 
 from cellplan import load_cell, solve
-from cellplan.checks.clearance.skew import allowed_skew, has_clocks
+from cellplan.checks.clearance.skew import allowed_skew
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell.cell import Cell, Part
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Report, ToolDepth
-from cellplan.model.report.skew import MOST_SKEW, SkewLimit, SkewReport
+from cellplan.model.report.skew import MOST_SKEW, SkewLimit, SkewReport, has_clocks
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.settings.task import ToleranceEntry
