@@ -1,11 +1,14 @@
 """The seam of the elbow arm on a part that a table of its controller turns meanwhile, all axes in step."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from builders.elbow_arm import closed_form, tip
 from builders.export_jobs import controlled, positioner_model, signals
+from builders.paced_pairs import FANUC_ZERO, WELD
 from builders.scene_builders import arm_model, held_part, placed
 from builders.seam_jobs import CONTROLLER, KUKA_ZERO, ROBOT, SEAM, TASK, VALVE, X_WP, poses, seam_job
 from cellplan.geometry.transforms import Array, inverse, pose
@@ -15,6 +18,7 @@ from cellplan.model.settings.controllers import ControllerEntry, RobotControlEnt
 from cellplan.programs.seams.shapes import Shape, arc, line
 
 TABLE = "table"
+MACHINE = {"machine": 2}  # what the cell states of it on a KUKA controller
 HELD = np.array(  # joints of the table in [rad] at all rows; the arc counts with its end
     [[0.0, 0.0], [0.0, 0.0], [0.01, 0.0], [0.03, -0.05], [0.03, -0.08], [0.05, -0.12], [0.05, -0.12], [0.0, 0.0]]
 )
@@ -28,9 +32,9 @@ def shapes() -> list[tuple[int, int, Shape]]:
     return [(1, 2, line(*X[:2])), (2, 3, line(*X[1:3])), (3, 5, curve), (5, 6, line(*X[4:]))]
 
 
-def table() -> Robot:
-    """A table that tilts and turns, on the controller of the arm."""
-    control = RobotControlEntry.model_validate({"id": CONTROLLER, "machine": 2}, strict=False)
+def table(stated: Mapping[str, Any] = MACHINE) -> Robot:
+    """A table that tilts and turns, on the controller of the arm, of which the cell states something."""
+    control = RobotControlEntry.model_validate({"id": CONTROLLER, **stated}, strict=False)
     return replace(placed(TABLE, positioner_model(), base=pose((0.7, 0.1, 0.0), (0.0, 0.0, 0.3))), control=control)
 
 
@@ -46,9 +50,23 @@ def joints_at(robot: Robot, X_PT: Array, held: Array) -> Array:
 
 
 def job_in_step(*, number: int | None = None) -> ExportJob:
-    """The job of the arm and the table."""
-    job = seam_job("kuka", controller=KUKA_ZERO, process=VALVE, number=number)
-    robot, rows, turning = job.frame.robot(ROBOT), job.programs[0].robots[ROBOT], table()
+    """The job of the arm and the table on a KUKA controller."""
+    return held(seam_job("kuka", controller=KUKA_ZERO, process=VALVE, number=number), table(), number=number)
+
+
+def fanuc_in_step() -> ExportJob:
+    """The same on a FANUC controller, whose corner is rounded within 12 mm."""
+    stated = {"group": 1, "tool_number": 2}
+    job = held(
+        seam_job("fanuc", controller=FANUC_ZERO, process=WELD, control=stated), table({"group": 2, "tool_number": 1})
+    )
+    robots = {name: replace(rows, times=2.0 * np.arange(8.0)) for name, rows in job.programs[0].robots.items()}
+    return replace(job, programs=(replace(job.programs[0], robots=robots),))
+
+
+def held(job: ExportJob, turning: Robot, *, number: int | None = None) -> ExportJob:
+    """The job of an arm whose part a table holds."""
+    robot, rows = job.frame.robot(ROBOT), job.programs[0].robots[ROBOT]
     q = rows.q.copy()
     q[1:7] = [joints_at(robot, X, held) for X, held in zip(poses(), HELD[1:7], strict=True)]
     X_FP = inverse(tip(turning, HELD[1])) @ X_WP

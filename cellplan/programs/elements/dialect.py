@@ -1,6 +1,6 @@
 """Dialect: what a program format is, and the one signature that all formats share."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -11,6 +11,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, Interpolation, Moves, ProgramRows, Promise, RobotRows
 from cellplan.model.settings.controllers import KindName
+from cellplan.programs.elements.joints import Axes
 
 SHARES: Final = (0.5, 0.35, 0.25, 0.15, 0.1, 0.05, 0.0)  # [-] of a segment, the largest first
 Render = Callable[[ExportJob], dict[str, str]]
@@ -55,7 +56,8 @@ class Dialect:
     shortest_time: float = 0.0  # shortest time in [s] between two rows that targets are known to keep; 0 for no limit
     is_proved: bool = False  # whether that time is documented by the maker, not only known from practice
     has_part_targets: bool = False  # whether rows can be poses of tools on the part while robots move in step
-    has_seams_in_step: bool = False  # or whether tools then move on lines and arcs in its frame
+    has_seams_in_step: bool = False  # or whether the tool of the only arm then moves on lines and arcs in its frame
+    has_joint_seams: bool = False  # whether points of these are stated as joints of all robots
     repeats_seams: bool = False  # whether its programs may pass a seam more than once
     moves: tuple[Moves, ...] = (Moves.JOINTS,)  # how its programs can move tools where they work
     # configuration of arms as its targets state it, for joints in [rad] or [m], shape (N, n) to (N, k); an
@@ -74,4 +76,8 @@ class Dialect:
     def has_seams(self, frame: ExportFrame) -> bool:
         """Whether tools move on lines and arcs in an export."""
         in_step = frame.promise is Promise.SYNCHRONISED and frame.moves is not Moves.JOINTS
-        return frame.promise is Promise.PACED or (in_step and self.has_seams_in_step)
+        return frame.promise is Promise.PACED or (in_step and self.has_lines_of(map(frame.robot, frame.robots)))
+
+    def has_lines_of(self, robots: Iterable[Robot]) -> bool:
+        """Whether tools move on lines and arcs where these robots move in step."""
+        return self.has_seams_in_step and sum(bool(Axes.of(robot).arm) for robot in robots) == 1

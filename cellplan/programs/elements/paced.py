@@ -250,7 +250,8 @@ class ReadMove:
     Attributes:
         refuse: Raises the error that something else is expected at its statement.
         task: The task after which the routine is named in which it stands; None for none.
-        q: Joints in [rad] or [m], shape (n,); NaN for the arm where a pose is stated.
+        q: Joints in [rad] or [m], shape (n,), or of each of its poses, shape (k, n); NaN for an arm whose pose is
+            stated.
         poses: Its pose, and before it that of the intermediate point of an arc, in the frame of the part; none for a
             move of joints.
         configurations: Configuration of each, as the format counts it; None where it states none.
@@ -329,9 +330,10 @@ class _RowsOfMoves:
         is_on = bool(self._process) and self._process[-1]
         if not move.poses:
             self._rows.append((move.q, np.full((4, 4), np.nan), None, np.nan, False))
-        for place, pose in enumerate(move.poses):
+        joints = np.broadcast_to(move.q, (len(move.poses), move.q.shape[-1]))
+        for place, (pose, q) in enumerate(zip(move.poses, joints, strict=True)):
             stated = None if move.configurations is None else move.configurations[place]
-            self._rows.append((move.q, pose, stated, move.feed, place < len(move.poses) - 1))
+            self._rows.append((q, pose, stated, move.feed, place < len(move.poses) - 1))
         count = len(self._rows) - first
         self._zones += [(0.0, 0.0)] * (count - 1) + [(move.zone, move.share)]
         self._stated += [(move.duration, move.speed)] * count

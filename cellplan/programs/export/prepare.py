@@ -21,7 +21,7 @@ from cellplan.programs.promises.orders import Orders
 from cellplan.programs.promises.promises import Promised, choose_promise, controllers_of
 from cellplan.programs.promises.skew import RunSkew, run_skew
 from cellplan.programs.rows.feeds import feeds_in_step
-from cellplan.programs.rows.part_targets import with_part_poses
+from cellplan.programs.rows.part_targets import with_joints_of_arcs, with_part_poses
 from cellplan.programs.rows.resample import lead_time, resampled
 from cellplan.programs.rows.rows import essential_rows, full_rows
 from cellplan.programs.rows.thin import ThinningLimits, thinned
@@ -148,6 +148,8 @@ def _with_lines(
     limits = LineLimits(most, dialect.smallest_zone)
     while True:
         lines = with_seams(shared.scene, job, full, essential, limits=limits, by_joints=by_joints)
+        if dialect.has_joint_seams and not frame.promise.waits:
+            lines = replace(lines, programs=tuple(with_joints_of_arcs(frame, one) for one in lines.programs))
         if frame.moves is Moves.LINEAR:
             return lines, by_joints
         if not any(rows.seams for program in lines.programs for rows in program.robots.values()):

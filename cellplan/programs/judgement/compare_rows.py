@@ -16,7 +16,7 @@ from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.joints import Angle, from_numbers, in_step, to_numbers
 from cellplan.programs.elements.timed_rows import decimals_of
 
-TIME_ROUNDING: Final = 0.5e-3  # [s] formats write times with three decimals or more
+TIME_ROUNDING: Final = 0.5001e-3  # [s] formats write times with three decimals or more; half of the last one
 ROUNDING_TOL: Final = 1e-9  # [rad] or [m] arithmetic of units and zeros
 QUANTA: Final = 2.01  # [-] of the last decimal of a degree or millimetre: two axes that are coupled round by one each
 SHARE_TOL: Final = 0.02  # [-] zones are sizes, of segments between rows that are rounded; what is read is judged
@@ -85,7 +85,7 @@ def _other_move(written: RobotRows, read: RobotRows, row: int, *, quantum: float
         return "expected a pose and a speed, read none"
     off = MM * float(np.linalg.norm(read.X_PT[row, :3, 3] - written.X_PT[row, :3, 3]))
     turned = DEG * float(np.linalg.norm(rotation_vector(read.X_PT[row, :3, :3].T @ written.X_PT[row, :3, :3])))
-    if not (off <= quantum and turned <= SEAM_TURN):
+    if not (off <= quantum and turned <= SEAM_TURN) and np.any(np.isnan(read.q[row])):  # or else joints are compared
         return f"read a pose that is {off:.3g} mm and {turned:.3g} deg from what is written"
     if not abs(read.feeds[row] - written.feeds[row]) <= FEED_TOL:
         return f"expected a speed of {MM * written.feeds[row]:.6g} mm/s, read {MM * read.feeds[row]:.6g} mm/s"
@@ -155,7 +155,7 @@ def _other_position(dialect: Dialect, job: ExportJob, written: RobotRows, read: 
     """The first position that is not as written."""
     robot = job.frame.robot(written.robot)
     off = _off(robot, dialect, written.q, read.q, is_solved=dialect.states_poses(job.frame))
-    off[written.on_seam] = False
+    off[written.on_seam & np.any(np.isnan(read.q), axis=1)] = False
     if not np.any(off):
         return None
     row, index = (int(place) for place in np.argwhere(off)[0])

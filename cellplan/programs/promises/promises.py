@@ -194,8 +194,13 @@ def _against_synchronised(export: _Export) -> _Against | None:
     """Why the robots do not pass the same rows at the same time."""
     cell, robots = export.run.cell, export.robots
     dialect = export.dialect
-    if export.moves is Moves.LINEAR and not (dialect.has_part_targets or dialect.has_seams_in_step):
-        return _Against(f"{dialect.name} moves tools by joints where robots move in step")
+    has_lines = dialect.has_part_targets or dialect.has_lines_of(map(cell.robot, robots))
+    if export.moves is Moves.LINEAR and not has_lines:
+        arms = "other than one arm" if dialect.has_seams_in_step else "robots"
+        return _Against(f"{dialect.name} moves tools by joints where {arms} move in step (--moves joints)")
+    is_free = export.requested is None and dialect.has_joint_seams and export.moves is Moves.LINEAR
+    if is_free and _against_sequence(export) is None:
+        return _Against(f"{dialect.name} moves tools relative to another robot only where the part moves meanwhile")
     if len(robots) < 2:
         return _Against(f"it takes two robots on one controller, and only '{robots[0]}' is exported")
     names = list(dict.fromkeys(controllers_of(cell, robots).values()))
@@ -231,7 +236,7 @@ def _remarks(export: _Export, promise: Promise) -> Iterator[str]:
                 yield from _unmet(export)
         case Promise.SYNCHRONISED:
             yield "same row at the same time within the blend zones; the controller may take longer than planned"
-            if export.dialect.has_seams_in_step and export.moves is not Moves.JOINTS:
+            if export.dialect.has_lines_of(map(cell.robot, export.robots)) and export.moves is not Moves.JOINTS:
                 yield "on seams the tool moves at the programmed speed on the part, also where the part moves"
                 yield from _processes(export)
             yield from _stays(export)

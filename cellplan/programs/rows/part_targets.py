@@ -14,6 +14,7 @@ from cellplan.model.cell.cell import Cell, Relation
 from cellplan.model.report.exported import ExportFrame, ProgramRows, RobotRows
 from cellplan.model.task.task import Frame, Task
 from cellplan.model.units import MM
+from cellplan.programs.elements.frames import part_pose
 from cellplan.programs.elements.joints import Axes, to_numbers
 from cellplan.programs.formats.rapid.targets import QUARTER, configuration
 from cellplan.programs.formats.rapid.units import part_frame, works_on_part
@@ -266,6 +267,24 @@ def solved_joints(chain: ScrewChain, X_WT: Array, first: Array, *, arm: list[int
         J_T = np.swapaxes(J, 1, 2)
         q[:, arm] += (J_T @ np.linalg.solve(J @ J_T + DAMPING * np.eye(6), error[..., None]))[..., 0]
     return q, misses
+
+
+def with_joints_of_arcs(frame: ExportFrame, program: ProgramRows) -> ProgramRows:
+    """A program whose rows within arcs have the joints that bring the tool to the pose through which the arc leads."""
+    robots = dict(program.robots)
+    for name, rows in program.robots.items():
+        if rows.X_PT is None or rows.middles is None:
+            continue
+        chain, q = ScrewChain(frame.robot(name)), rows.q.copy()
+        for seam in rows.seams:
+            inside = seam.first + np.flatnonzero(rows.middles[seam.first : seam.last])
+            X_WP = part_pose(
+                frame, name, seam.task, {other.robot: other.q[inside] for other in program.robots.values()}
+            )
+            arm = list(Axes.of(frame.robot(name)).arm)
+            q[inside], _ = solved_joints(chain, X_WP @ rows.X_PT[inside], q[inside], arm=arm)
+        robots[name] = replace(rows, q=q)
+    return replace(program, robots=robots)
 
 
 def _same_configuration(configuration: NDArray[np.int_], read: NDArray[np.int_], numbers: Array) -> NDArray[np.bool_]:

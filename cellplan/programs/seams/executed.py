@@ -25,7 +25,7 @@ from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, 
 from cellplan.model.units import DEG, MM
 from cellplan.programs.elements.corners import row_shares
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.frames import controller_base, on_flange
+from cellplan.programs.elements.frames import part_pose
 from cellplan.programs.elements.joints import Axes, in_step
 from cellplan.programs.elements.process import ProcessForm
 from cellplan.programs.rows.part_targets import POSE_TOL, solved_joints, tip_jacobians
@@ -38,6 +38,7 @@ BENT: Final = 2.0  # [-] of what joints are off a line in the middle of a step: 
 RESERVE: Final = 1.2  # [-] of a Jacobian that changes within the tube
 EDGE: Final = 2e-5  # [rad] from the edge of a configuration within which either of its sides is right
 SPEED_TOL: Final = 1e-3  # [-] of a speed limit
+BRANCH: Final = 0.01  # [rad] or [m] other joints of an arm that bring its tool to the same pose differ by more
 BENDS: Final = 2e-4  # [rad] or [m] that joints of escape programs may be off their rows where they go back a seam
 SLACK: Final = 3e-4  # [rad] or [m] the same with the rounding of numbers, for which bodies are judged
 
@@ -147,6 +148,7 @@ class SeamExecution:
                     seam.task, f": row {last}: no arc of at most {DEG * LARGEST_ARC:.0f} deg leads through it"
                 )
             path = self._path(seam, (first, last), shape, (q, travelled))
+            self._require_joints(seam, last, path.q[-1], MM * (travelled + shape.length))
             paths.append((last, path))
             for row in range(first + 1, last + 1):
                 share = 1.0 if row == last else float(shape.shares(rows.X_PT[row, None, :3, 3])[0])
@@ -164,20 +166,15 @@ class SeamExecution:
 
         It is one pose for all, shape (4, 4), where no robot that moves in step holds the part.
         """
-        station = self._frame.station(self._rows.robot, seam.task)
-        if station.X is None:
-            raise InputError(f"task '{seam.task}': expected a part that rests, or moves with a robot of the controller")
-        if station.holder is None:
-            return controller_base(self._robot) @ station.X
-        holder = self._frame.robot(station.holder)
-        X_FP = inverse(on_flange(holder, np.eye(4))) @ station.X
-        if holder.name in self._columns:
-            return ScrewChain(holder).flange_poses(q[:, self._columns[holder.name]]) @ X_FP
-        rows = self._read.robots.get(station.holder, self._full.robots[station.holder])
-        times = self._full.robots[station.holder].times if rows.times is None else rows.times
+        holder = self._frame.station(self._rows.robot, seam.task).holder
+        if holder is None or holder in self._columns:
+            held = {name: q[:, columns] for name, columns in self._columns.items()}
+            return part_pose(self._frame, self._rows.robot, seam.task, held)
+        rows = self._read.robots.get(holder, self._full.robots[holder])
+        times = self._full.robots[holder].times if rows.times is None else rows.times
         at = 0.5 * float(np.sum(times_of(self._rows)[[seam.first, seam.last]]))
         q_holder = np.array([np.interp(at, times, column) for column in rows.q.T])  # type: ignore[arg-type]
-        return ScrewChain(holder).flange_poses(q_holder[None])[0] @ X_FP
+        return part_pose(self._frame, self._rows.robot, seam.task, {holder: q_holder[None]})[0]
 
     def _path(self, seam: Seam, rows: tuple[int, int], shape: Shape, begin: tuple[Array, float]) -> SeamPath:
         """One line or arc between two rows, from some joints and a length of the seam."""
@@ -207,6 +204,18 @@ class SeamExecution:
             _require_lead(self._form, seam, self._rows, rows, length=shape.length)
         tube = self._tube(seam, shape, shares, q, is_on=is_on)
         return SeamPath(shape=shape, shares=shares, times=times, q=q, tube=tube)
+
+    def _require_joints(self, seam: Seam, row: int, q: Array, place: float) -> None:
+        """The joints that were read at the end of a line or an arc are those in which the arm comes there."""
+        off = np.abs(self._q[row] - q)  # NaN where poses were read
+        if np.any(off > BRANCH):
+            joint = self._robot.model.joints[int(np.nanargmax(off[: len(self._robot.model.joints)]))].name
+            raise NotVerifiedError(
+                [
+                    f"task '{seam.task}', {place:.1f} mm along its seam: expected the joints with which "
+                    f"'{self._robot.name}' comes there, got others of joint {joint}"
+                ]
+            )
 
     def _require_configuration(self, seam: Seam, row: int, q: Array, place: float) -> None:
         """The configuration that was read with a pose is that of the joints; at an edge either side of it is right."""

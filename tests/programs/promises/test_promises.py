@@ -100,7 +100,9 @@ def test_tools_are_moved_on_lines_in_step_only_where_a_format_has_targets_on_the
 
     with pytest.raises(NotVerifiedError) as refusal:
         choose_promise(both, on_lines, ("left", "right"), moves=Moves.LINEAR)
-    assert "not synchronised: in-step moves tools by joints where robots move in step" in str(refusal.value)
+    assert "not synchronised: in-step moves tools by joints where robots move in step (--moves joints)" in str(
+        refusal.value
+    )
     for dialect, moves in ((replace(on_lines, has_part_targets=True), Moves.LINEAR), (on_lines, Moves.AUTO)):
         assert choose_promise(both, dialect, ("left", "right"), moves=moves).promise is Promise.SYNCHRONISED
 

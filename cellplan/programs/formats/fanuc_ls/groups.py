@@ -1,16 +1,17 @@
 """Motion groups of FANUC controllers: which robot is which one, in which program, with which axes and frames."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from cellplan.errors import InputError
+from cellplan.errors import InputError, LineRefusedError
 from cellplan.model.cell.cell import Robot
-from cellplan.model.report.exported import ExportFrame, Promise
+from cellplan.model.report.exported import ExportFrame, Moves, Promise
+from cellplan.model.task.task import Frame
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.handshake import signals_by_key
 from cellplan.programs.elements.joints import Axes, require_counted
@@ -86,7 +87,8 @@ def tp_programs(frame: ExportFrame, dialect: Dialect) -> list[TpProgram]:
     seams = {
         (label, task): f"{label}\0\0{task}"
         for (_, unit), label in labels.items()
-        for station in frame.stations.get(unit, ())
+        for group in units[unit]
+        for station in frame.stations.get(group.robot.name, ())
         for task in station.tasks
     }
     names = {label: name.upper() for label, name in page_names([*labels.values(), *seams.values()], NAMES).items()}
@@ -131,9 +133,12 @@ def demands(frame: ExportFrame, _rows: int = 0) -> Iterator[Callable[[], object]
         yield partial(_require_frames, frame, name)
         yield partial(_require_signals, frame, name)
         yield partial(_require_axes, robot)
-        if frame.promise is Promise.PACED and any(task.robot == name for task in frame.cell.tasks):
+        has_task = any(task.robot == name for task in frame.cell.tasks)
+        if frame.promise is Promise.PACED and has_task:
             yield partial(_require_stations, frame, name)
             yield partial(configuration, robot, np.zeros((1, len(robot.model.joints))))
+        elif frame.promise is Promise.SYNCHRONISED and frame.moves is not Moves.JOINTS and has_task:
+            yield partial(_require_tool, frame, name)
 
 
 def _require_stations(frame: ExportFrame, robot: str) -> None:
@@ -141,14 +146,36 @@ def _require_stations(frame: ExportFrame, robot: str) -> None:
     control, key = frame.robot(robot).control, f"robots.{robot}.controller"
     if control is None or not (control.frames or control.base_number):
         raise InputError(f"{key}.frames: expected the numbers of the frames of the part, 1 to {FRAMES[1]}, got none")
-    if control.tool_number is None:
-        raise InputError(f"{key}.tool_number: expected the number of its tool frame, from which it moves, got none")
+    _require_tool(frame, robot)
     for station in frame.stations.get(robot, ()):
         if station.holder is not None:
             raise InputError(
                 f"--moves linear: expected a part that no group of '{control.id}' holds, got '{station.holder}': "
                 "fanuc_ls moves tools by joints there"
             )
+
+
+def _require_tool(frame: ExportFrame, robot: str) -> None:
+    """Refuse lines and arcs of a tool whose frame has no number."""
+    control = frame.robot(robot).control
+    if control is None or control.tool_number is None:
+        key = f"robots.{robot}.controller.tool_number"
+        raise InputError(f"{key}: expected the number of its tool frame, which moves on lines, got none")
+
+
+def require_leader(frame: ExportFrame, groups: Sequence[MotionGroup], task: str) -> int:
+    """Number of the group that holds the part of a task beside the arm; ``LineRefusedError`` for other groups."""
+    holder = next((grasp.robot for grasp in frame.cell.part.held_by), None)
+    others = [group for group in groups if group.robot.name != frame.cell.task(task).robot]
+    is_on_part = frame.cell.task(task).relative_to is Frame.PART
+    if not is_on_part or [group.robot.name for group in others] != [holder]:
+        names = ", ".join(group.robot.name for group in others)
+        raise LineRefusedError(
+            task,
+            f": COORD leads the tool in the frame of one group, expected the holder of the part beside the arm, got "
+            f"{names}; write joints (--moves joints)",
+        )
+    return others[0].number
 
 
 def _require_axes(robot: Robot) -> None:

@@ -9,7 +9,7 @@ from cellplan.model.report.exported import ExportFrame, Promise
 from cellplan.model.units import MM
 from cellplan.programs.elements.text import Statement
 from cellplan.programs.formats.fanuc_ls.groups import MotionGroup, TpProgram, seam_name
-from cellplan.programs.formats.fanuc_ls.seams import MOST_FEED, MOST_REGION
+from cellplan.programs.formats.fanuc_ls.seams import COORD, MOST_FEED, MOST_REGION
 from cellplan.programs.formats.fanuc_ls.text import TpFile, TpPoint, read_file
 
 MOST_MS: Final = 32_000  # [ms] of a motion
@@ -94,7 +94,7 @@ class TpPlayer:
             self._select(statement)
         elif task is not None:
             self._seam(statement, task, left)
-        elif self.in_step or (statement.kind == "CALL" and self.task is None):
+        elif (self.in_step or statement.kind == "CALL") and self.task is None:
             raise statement.error("motions, the selection of frames, and calls of pages and seams in their order")
         elif self.motions and (self.motions[-1].is_passed or self.motions[-1].region):
             raise statement.error("FINE before it", f"{statement.text} behind CNT or CR")
@@ -135,8 +135,8 @@ class TpPlayer:
         self.settings.add(key)
 
     def _base(self, group: MotionGroup) -> int:
-        """Number of the user frame of a group: that of the station in a seam."""
-        if self.task is None:
+        """Number of the user frame of a group: that of the station in a seam, unless groups move in step."""
+        if self.task is None or self.in_step:
             return group.base
         return self.frame.station(group.robot.name, self.task).number or group.base
 
@@ -148,6 +148,11 @@ class TpPlayer:
         if is_joint is not (self.is_fresh or self.task is None):
             raise statement.error("J outside of seams and at their first point, L and C behind it")
         names, motion = _motion(statement, is_timed=self.in_step and bool(self.motions))
+        if self.in_step and not is_joint:
+            coordinated, _, rest = motion.suffix.partition(" ")
+            if coordinated != COORD:
+                raise statement.error(f"{COORD} behind a line or an arc of groups in step")
+            motion = replace(motion, suffix=rest.strip())
         points = tuple(point for number, _ in names if (point := self.unused.pop(number, None)) is not None)
         if len(points) < len(names):
             raise statement.error("points of this file, each once")
@@ -155,7 +160,7 @@ class TpPlayer:
             if name not in {"", point.name}:
                 raise statement.error(f"P[{number}] with the name of the point, '{point.name}', or with none", name)
             for group in groups:
-                _require_pose(point, group, self._base(group), is_joint=is_joint)
+                _require_pose(point, group, self._base(group), is_joint=is_joint or self.in_step)
         self.motions.append(replace(motion, points=points, task=self.task))
         self.is_fresh = False
 

@@ -23,7 +23,7 @@ from cellplan.programs.formats.fanuc_ls.output import TpText, frames, instructio
 from cellplan.programs.formats.fanuc_ls.player import MOST_MS
 from cellplan.programs.formats.fanuc_ls.poses import configuration
 from cellplan.programs.formats.fanuc_ls.reader import read_fanuc_ls
-from cellplan.programs.formats.fanuc_ls.seams import tp_events, write_seam
+from cellplan.programs.formats.fanuc_ls.seams import SeamRows, tp_events, write_seam
 from cellplan.programs.formats.fanuc_ls.text import REMARK
 
 DECIMALS: Final = 4
@@ -47,8 +47,9 @@ def _texts(job: ExportJob, program: TpProgram, rows: ProgramRows) -> list[TpText
     """The program, or the main program and its pages, each with those of its seams behind it."""
     groups, name = program.groups, program.name
     parts = [paged(job, FANUC_LS, rows, group.robot.name, name) for group in groups]
-    stretches = _stretches(parts[0].rows)
-    first = replace(parts[0], pages=pages_of(len(stretches), job.frame, FANUC_LS))
+    lead = next((part for part in parts if part.rows.seams), parts[0])
+    stretches = _stretches(lead.rows)
+    first = replace(lead, pages=pages_of(len(stretches), job.frame, FANUC_LS))
     times = _durations(rows, parts) if job.frame.promise is Promise.SYNCHRONISED else None
     speeds = times or [f"{speed}%" for speed in first.speeds]
     notes = dict.fromkeys(chain.from_iterable(head_notes(job, group.robot.name) for group in groups))
@@ -59,7 +60,9 @@ def _texts(job: ExportJob, program: TpProgram, rows: ProgramRows) -> list[TpText
         calls = [f"CALL {name}{ending}" for ending in first.endings]
         texts.append(TpText(name, groups, [*head, *setup, *calls]))
         setup = []
-    seams = _seam_programs(job, program, rows, first)
+    seams = _seam_programs(
+        job, program, rows, SeamRows(job.frame, parts, speeds, row_shares(job, rows)[lead.placed.name])
+    )
     passed = _passed(job, rows, parts, [stretches[page[-1]][-1] for page in first.pages])
     for ending, page in zip(first.endings, first.pages, strict=True):
         text = TpText(f"{name}{ending}", groups, [*head, *setup])
@@ -67,7 +70,7 @@ def _texts(job: ExportJob, program: TpProgram, rows: ProgramRows) -> list[TpText
         for row, *_ in stretches[page.start : page.stop]:
             if row in seams:
                 texts.append(seams[row])
-                text.instructions += [f"CALL {seams[row].name}", *frames(groups[0])]
+                text.instructions += [f"CALL {seams[row].name}", *chain.from_iterable(map(frames, groups))]
                 continue
             poses = [
                 joint_pose(group, part.numbers[row], part.decimals) for group, part in zip(groups, parts, strict=True)
@@ -77,17 +80,18 @@ def _texts(job: ExportJob, program: TpProgram, rows: ProgramRows) -> list[TpText
     return texts
 
 
-def _seam_programs(job: ExportJob, program: TpProgram, rows: ProgramRows, part: PagedProgram) -> dict[int, TpText]:
+def _seam_programs(job: ExportJob, program: TpProgram, rows: ProgramRows, of_seams: SeamRows) -> dict[int, TpText]:
     """The programs of the seams of a robot by the row at which each is entered."""
-    texts, passes, robot = dict[int, TpText](), dict[str, int](), part.placed.name
-    if not part.rows.seams:
+    texts, passes = dict[int, TpText](), dict[str, int]()
+    if not any(part.rows.seams for part in of_seams.parts):
         return texts
-    moves, shares = moves_of(job, rows, tp_events(job.frame, robot)), row_shares(job, rows)[robot]
+    part = of_seams.part
+    moves = moves_of(job, rows, tp_events(job.frame, part.placed.name))
     for seam in part.rows.seams:
         passes[seam.task] = passes.get(seam.task, 0) + 1
         texts[seam.first] = TpText(seam_name(program, seam.task, passes[seam.task]), program.groups, [])
         inside = [move for move in moves if seam.first <= move.row <= seam.last]
-        write_seam(texts[seam.first], job.frame, part, seam, inside, shares=shares)
+        write_seam(texts[seam.first], of_seams, seam, inside)
     return texts
 
 
@@ -102,12 +106,18 @@ def _stretches(rows: RobotRows) -> list[range]:
 
 
 def _durations(rows: ProgramRows, parts: Sequence[PagedProgram]) -> list[str]:
-    """How each row is approached in step: the first one slowly, all others in whole milliseconds that do not add up."""
+    """How each row is approached in step: the first one slowly, all others in whole milliseconds that do not add up.
+
+    They may where seams, which have no times, are between.
+    """
     clock = shared_clock(rows, [part.placed.name for part in parts])
-    steps = np.diff(np.rint(MS * clock)).astype(int).tolist()
-    if not all(0 < step <= MOST_MS for step in steps):
-        raise InputError(f"{FANUC_LS.name}: expected rows 1 to {MOST_MS} ms apart, got {min(steps)} to {max(steps)}")
-    return [f"{SLOW}%", *(f"{step}msec" for step in steps)]
+    on_seam = np.any([part.rows.on_seam for part in parts], axis=0)
+    steps = np.rint(MS * np.diff(clock)) if np.any(on_seam) else np.diff(np.rint(MS * clock))
+    by_joints = steps[~on_seam[1:]]
+    if not np.all((by_joints > 0) & (by_joints <= MOST_MS)):
+        got = f"{by_joints.min():.0f} to {by_joints.max():.0f}"
+        raise InputError(f"{FANUC_LS.name}: expected rows 1 to {MOST_MS} ms apart, got {got}")
+    return [f"{SLOW}%", *(f"{step:.0f}msec" for step in steps)]
 
 
 def _passed(job: ExportJob, rows: ProgramRows, parts: Sequence[PagedProgram], ends: Sequence[int]) -> Flags:
@@ -118,7 +128,7 @@ def _passed(job: ExportJob, rows: ProgramRows, parts: Sequence[PagedProgram], en
     shares = row_shares(job, rows)
     passed: Flags = np.logical_and.reduce([shares[part.placed.name] >= LARGEST_SHARE for part in parts])
     moved = np.any(np.concatenate([np.diff(part.numbers, axis=0) for part in parts], axis=1) != 0.0, axis=1)
-    passed[[*ends, *(max(seam.first - 1, 0) for seam in parts[0].rows.seams)]] = False
+    passed[[*ends, *(max(seam.first - 1, 0) for part in parts for seam in part.rows.seams)]] = False
     passed[1:] &= moved
     passed[:-1] &= moved
     return passed
@@ -140,6 +150,8 @@ FANUC_LS: Final[Dialect] = Dialect(
     moves=tuple(Moves),
     repeats_seams=True,
     configuration=configuration,
+    has_seams_in_step=True,
+    has_joint_seams=True,
     speeds=percentages,
     demands=demands,
 )
