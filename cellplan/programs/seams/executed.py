@@ -148,7 +148,6 @@ class SeamExecution:
                     seam.task, f": row {last}: no arc of at most {DEG * LARGEST_ARC:.0f} deg leads through it"
                 )
             path = self._path(seam, (first, last), shape, (q, travelled))
-            self._require_joints(seam, last, path.q[-1], MM * (travelled + shape.length))
             paths.append((last, path))
             for row in range(first + 1, last + 1):
                 share = 1.0 if row == last else float(shape.shares(rows.X_PT[row, None, :3, 3])[0])
@@ -205,24 +204,24 @@ class SeamExecution:
         tube = self._tube(seam, shape, shares, q, is_on=is_on)
         return SeamPath(shape=shape, shares=shares, times=times, q=q, tube=tube)
 
-    def _require_joints(self, seam: Seam, row: int, q: Array, place: float) -> None:
-        """The joints that were read at the end of a line or an arc are those in which the arm comes there."""
-        off = np.abs(self._q[row] - q)  # NaN where poses were read
-        if np.any(off > BRANCH):
-            joint = self._robot.model.joints[int(np.nanargmax(off[: len(self._robot.model.joints)]))].name
+    def _require_configuration(self, seam: Seam, row: int, q: Array, place: float) -> None:
+        """The configuration that was read with a pose is that of the joints; at an edge either side of it is right.
+
+        Where joints were read they are those in which the arm comes to the end of a line or an arc.
+        """
+        read, function = self._rows.configuration, self._dialect.configuration
+        arm = q[:, self._columns[self._robot.name]]
+        off = np.abs(self._rows.q[row] - arm[0])  # NaN where poses were read
+        if self._rows.middles is not None and not self._rows.middles[row] and np.any(off > BRANCH):
             raise NotVerifiedError(
                 [
                     f"task '{seam.task}', {place:.1f} mm along its seam: expected the joints with which "
-                    f"'{self._robot.name}' comes there, got others of joint {joint}"
+                    f"'{self._robot.name}' comes there, got others of joint "
+                    f"{self._robot.model.joints[int(np.nanargmax(off))].name}"
                 ]
             )
-
-    def _require_configuration(self, seam: Seam, row: int, q: Array, place: float) -> None:
-        """The configuration that was read with a pose is that of the joints; at an edge either side of it is right."""
-        read, function = self._rows.configuration, self._dialect.configuration
         if read is None or function is None:
             return
-        arm = q[:, self._columns[self._robot.name]]
         near = [function(self._robot, arm + turn)[0] for turn in (-EDGE, 0.0, EDGE)]
         if not np.all(np.any(np.equal(near, read[row]), axis=0)):
             raise NotVerifiedError(

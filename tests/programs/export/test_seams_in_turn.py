@@ -164,3 +164,34 @@ def test_an_arm_and_its_positioner_wait_for_an_arm_of_another_controller(tmp_pat
     assert run_command(verify, tmp_path)[0] == 0
     (tmp_path / "p" / "krl" / "arm.src").write_bytes(source.replace("WAIT FOR $IN[1]\r\n", "", 1).encode())
     assert run_command(verify, tmp_path)[0] != 0
+
+
+@pytest.mark.slow
+def test_a_fanuc_arm_welds_a_ring_relative_to_its_positioner(tmp_path: Path) -> None:
+    """At most twelve statements of motion and process, in step; three of the numbers are changed on disk."""
+    text = TABLE.read_text(encoding="utf-8").replace("kind: kuka", "kind: fanuc")
+    text = text.replace("'$OUT[5]=TRUE'", "'Arc Start[1]'").replace("'$OUT[5]=FALSE'", "'Arc End[1]'")
+    text = text.replace("{id: krc, tool_number: 1,", "{id: krc, group: 1, tool_number: 1,")
+    (tmp_path / "cell.yaml").write_text(text.replace("{id: krc, machine: 2,", "{id: krc, group: 2,"), encoding="utf-8")
+    export = "cellplan export run --cell cell.yaml --format fanuc_ls --moves linear -o p"
+    for command in ("cellplan solve cell.yaml -o run -q", export):
+        assert run_command(command, tmp_path)[0] == 0
+
+    path = tmp_path / "p" / "KRC_RING.ls"
+    seam = path.read_bytes().decode()
+    motions = re.findall(r"(?m)^ *\d+:([JLC]) P", seam)
+    assert (motions[0], motions[1], motions[-1]) == ("J", "L", "L")
+    assert len(motions) <= 10
+    assert len(re.findall(r"\w COORD", seam)) == len(motions) - 1
+    turned = [float(angle) for angle in re.findall(r"GP2:\s+UF : 0, UT : 1,\s+J1 = \S+ deg, J2 = (\S+) deg", seam)]
+    assert max(turned) - min(turned) > 3.0
+    verify = "cellplan verify p --run run --cell cell.yaml -q"
+    assert run_command(verify, tmp_path)[0] == 0
+    for old, new in (
+        ("40mm/sec", "41mm/sec"),
+        ("CR1 COORD", "CR1"),
+        (f"J2 = {turned[3]:.4f}", f"J2 = {turned[3] + 1:.4f}"),
+    ):
+        assert old in seam
+        path.write_bytes(seam.replace(old, new, 1).encode())
+        assert run_command(verify, tmp_path)[0] != 0

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders.elbow_arm import tip
+from builders.mutations import LANGUAGES, mutations
 from builders.seam_jobs import ROBOT, poses
 from builders.seams_in_step import HELD, TABLE, fanuc_in_step, part_at, run_in_step, shapes
 
@@ -145,6 +146,16 @@ def test_a_change_is_noticed(name: str) -> None:
     assert changed != files[file]
 
     assert words in finding(job, files | {file: changed})
+
+
+@pytest.mark.slow
+def test_every_change_of_the_programs_is_noticed() -> None:
+    job = fanuc_in_step()
+    files = FANUC_LS.render(job)
+    changes = list(mutations(files, LANGUAGES["fanuc_ls"]))
+
+    assert len(changes) > 300
+    assert [change[:5] for change in changes if not finding(job, files | {change.file: change.text})] == []
 
 
 def test_another_branch_of_the_arm_is_refused_where_a_line_ends() -> None:
