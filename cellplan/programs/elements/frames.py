@@ -5,10 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.geometry.transforms import Array, inverse
+from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_about
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, Station
-from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 
 def controller_base(robot: Robot) -> Array:
@@ -23,6 +22,25 @@ def on_flange(robot: Robot, X_FA: Array) -> Array:
     return X_FA if stated is None else inverse(stated.matrix) @ X_FA
 
 
+def carried_poses(robot: Robot, q: Array, X_FA: Array) -> Array:
+    """A pose in the flange, in the base of the model in [m], shape (N, 4, 4), for joints in [rad] or [m], shape (N, n).
+
+    It is the product of exponentials of all axes down to the flange.
+    """
+    model, X_BA = robot.model, robot.model.X_BF @ X_FA
+    p, R = np.broadcast_to(X_BA[:3, 3], (len(q), 3)), np.broadcast_to(X_BA[:3, :3], (len(q), 3, 3))
+    for link in reversed(model.links_to_flange):
+        axis, drive = model.axes[link], model.drive(link)
+        position = drive.ratio * q[:, drive.joint] + drive.offset
+        if axis.is_revolute:
+            turn = rotation_about(axis.axis_B, position)
+            p = axis.point_B + np.einsum("nij,nj->ni", turn, p - axis.point_B)
+            R = turn @ R
+        else:
+            p = p + position[:, None] * axis.axis_B
+    return pose_from(R, p)
+
+
 def part_pose(frame: ExportFrame, robot: str, task: str, q: Mapping[str, Array]) -> Array:
     """The frame of a task in the world as its controller has it, shape (N, 4, 4), or (4, 4) where it is fixed.
 
@@ -34,7 +52,9 @@ def part_pose(frame: ExportFrame, robot: str, task: str, q: Mapping[str, Array])
     if station.holder is None:
         return controller_base(frame.robot(robot)) @ station.X
     holder = frame.robot(station.holder)
-    return ScrewChain(holder).flange_poses(q[holder.name]) @ inverse(on_flange(holder, np.eye(4))) @ station.X
+    X_FP = inverse(on_flange(holder, np.eye(4))) @ station.X
+    X_WP: Array = holder.X_WB @ carried_poses(holder, q[holder.name], X_FP)
+    return X_WP
 
 
 def require_rest(robot: str, station: Station) -> None:

@@ -11,10 +11,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array, rotation_about
+from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import RobotRows
 from cellplan.programs.elements.corners import LARGEST_SHARE
+from cellplan.programs.elements.frames import carried_poses
 from cellplan.programs.elements.paced import Move, ReadMove
 
 HALVINGS: Final = 24  # of the search for a share, to 3e-8
@@ -37,21 +38,8 @@ def tool_zones(robot: Robot, q: Array, shares: Array) -> Array:
 
 
 def tool_tips(robot: Robot, q: Array) -> Array:
-    """Tool tip in the base frame in [m], shape (N, 3), of positions of the model in [rad] or [m], shape (N, n).
-
-    It is the product of exponentials of all axes down to the flange.
-    """
-    model = robot.model
-    p = np.broadcast_to((model.X_BF @ robot.tool.X_FT)[:3, 3], (len(q), 3))
-    for link in reversed(model.links_to_flange):
-        axis, drive = model.axes[link], model.drive(link)
-        position = drive.ratio * q[:, drive.joint] + drive.offset
-        if axis.is_revolute:
-            R = rotation_about(axis.axis_B, position)
-            p = axis.point_B + np.einsum("nij,nj->ni", R, p - axis.point_B)
-        else:
-            p = p + position[:, None] * axis.axis_B
-    return p
+    """Tool tip in the base frame in [m], shape (N, 3), of positions of the model in [rad] or [m], shape (N, n)."""
+    return carried_poses(robot, q, robot.tool.X_FT)[:, :3, 3]
 
 
 def on_scale(sizes: Array, scale: Sequence[int]) -> NDArray[np.int_]:

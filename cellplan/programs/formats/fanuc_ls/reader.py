@@ -12,7 +12,7 @@ from cellplan.model.report.exported import ExportFrame, ProgramRows, Promise, Ro
 from cellplan.model.units import MM
 from cellplan.programs.elements.conventions import CONVENTIONS
 from cellplan.programs.elements.corners import LARGEST_SHARE
-from cellplan.programs.elements.frames import part_pose
+from cellplan.programs.elements.frames import carried_poses, part_pose
 from cellplan.programs.elements.joints import Axes, from_numbers
 from cellplan.programs.elements.paced import ENDS, Events, ReadMove, Which, rows_of_moves, shorter_lengths
 from cellplan.programs.formats.fanuc_ls.groups import KIND, MotionGroup, TpProgram
@@ -20,7 +20,6 @@ from cellplan.programs.formats.fanuc_ls.player import MILLISECONDS, TpMotion, Tp
 from cellplan.programs.formats.fanuc_ls.poses import read_configuration
 from cellplan.programs.formats.fanuc_ls.seams import TRIGGER, WELD_SPEED, speed_is_held, tp_events
 from cellplan.programs.formats.fanuc_ls.text import TpPoint
-from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 ARM: Final = 6  # numbers of a pose, as many as of the joints of an arm
 
@@ -70,7 +69,7 @@ def _on_part(player: TpPlayer, group: MotionGroup, motion: TpMotion, point: TpPo
     if point.poses[group.number].configuration or motion.task is None:
         return CONVENTIONS[KIND].pose(np.array(point.poses[group.number].values[:ARM]))
     q = {one.robot.name: _joints(one, point)[None] for one in player.program.groups}
-    X_WT = ScrewChain(group.robot).tool_poses(q[group.robot.name])
+    X_WT = group.robot.X_WB @ carried_poses(group.robot, q[group.robot.name], group.robot.tool.X_FT)
     X_PT: Array = inverse(part_pose(player.frame, group.robot.name, motion.task, q)) @ X_WT
     return X_PT[0]
 
