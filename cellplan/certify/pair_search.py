@@ -186,7 +186,6 @@ class SolidSearch(Search):
         return reading
 
     def _measured(self, sample: int, goal: float) -> Reading:
-        """Reading of the engine at a sample."""
         poses = self._motion.poses
         reading = quick_reading(self._engine, self._pair, poses, sample=sample)
         if reading.is_exact or reading.bound >= goal:

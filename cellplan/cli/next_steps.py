@@ -61,7 +61,6 @@ def _settings(changes: Mapping[str, object]) -> list[str]:
 
 
 def _folders(allow_dirs: Sequence[Path]) -> list[str]:
-    """Allowed folders as options."""
     return [word for folder in allow_dirs for word in ("--allow-dir", str(folder))]
 
 

@@ -59,6 +59,5 @@ def _child() -> ChildProcess:
 
 @atexit.register
 def _end_child() -> None:
-    """End the child, if there is one."""
     while _running:
         _running.pop().end()

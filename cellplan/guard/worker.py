@@ -64,7 +64,6 @@ def _end_with_parent() -> None:
 
 
 def _done(job: WorkerJob) -> Answer:
-    """Answer to a job."""
     try:
         if job.folder is not None:
             os.chdir(job.folder)

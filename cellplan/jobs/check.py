@@ -193,7 +193,6 @@ def check_lines(record: Record) -> list[str]:
 
 
 def _posture(start: Record) -> str:
-    """A start posture by joint."""
     return ", ".join(
         f"{joint} {round(position, 9) + 0.0:.4g}" for joint, position in start.items()
     )  # -1e-12 is rounding

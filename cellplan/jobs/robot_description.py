@@ -117,7 +117,6 @@ def description_lines(record: dict[str, Any]) -> list[str]:
 
 
 def _reach(record: dict[str, Any]) -> str:
-    """The reach, where it is known."""
     return "" if record["reach_mm"] is None else f"reach {record['reach_mm']:g} mm from the first axis; "
 
 

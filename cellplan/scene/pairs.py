@@ -221,5 +221,4 @@ def _stands_below(a: SceneBody, b: SceneBody, tree: LinkTree) -> str | None:
 
 
 def _joined_to(body: SceneBody, tree: LinkTree) -> int:
-    """The link that a body is, or is mounted on."""
     return body.link if body.kind is Kind.LINK else tree.carrier(body.link)

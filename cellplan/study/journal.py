@@ -105,7 +105,6 @@ class Journal:
         self.ahead = {number: trial for number, trial in read_ahead(self._ahead).items() if number >= len(lines) - 1}
 
     def _trial(self, line: str, number: int) -> StudyTrial:
-        """The trial of a line."""
         try:
             trial = StudyTrial.from_record(json.loads(line))
         except (ValueError, KeyError, TypeError, RecursionError):

@@ -176,7 +176,6 @@ class _ShiftSearch:
         return np.maximum(np.maximum(t[:, 2] - t[:, 1], t[:, 0] - t[:, 3]), self._floors[boxes.pair])
 
     def _limit(self, box: Boxes, shift: float) -> None:
-        """Record a box that limits the shift."""
         if shift < self._shift:
             first, second = box.middles[0].tolist()
             self._shift, self._pair, self._at = shift, int(box.pair[0]), (first, second)

@@ -125,7 +125,6 @@ def _at_work(bound: Bound, times: Array) -> list[Contact]:
 
 
 def _pair_collision(pair: tuple[str, str], contacts: Sequence[Contact]) -> Check:
-    """The failed check of one pair."""
     first = contacts[0]
     when = f"from {first.first_s:.3f} s to {first.last_s:.3f} s"
     if first.first_s == first.last_s:

@@ -48,7 +48,6 @@ def _passed(depth: PairDepth) -> bool:
 
 
 def _check(scene: Scene, mounted: PairDepth, times: Array | None) -> Check:
-    """The verdict on one pair."""
     pair, (inner, outer) = mounted.pair, _named(scene, mounted)
     depth, limit = MM * mounted.depth if mounted.depth > DEPTH_TOL else 0.0, MM * pair.limit
     at_s = None if times is None or not pair.moves else float(times[mounted.row])

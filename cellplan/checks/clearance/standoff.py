@@ -18,7 +18,6 @@ def check_standoffs(cell: Cell, standoffs: Sequence[Standoff]) -> list[Check]:
 
 
 def _check(task: Task, standoff: Standoff) -> Check:
-    """The check of one task."""
     low, high = task.standoff or (0.0, UNSTATED)
     judged = standoff.worst_along if low > 0.0 else standoff.worst_nearest
     when = " on its path" if standoff.at_s is None else f" at {standoff.at_s:.3f} s"

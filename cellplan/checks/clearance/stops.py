@@ -113,7 +113,6 @@ def instant_text(instant: StopInstant | None) -> str:
 
 
 def _check(name: str, passed: bool, values: tuple[float, float], of: str, instant: StopInstant | None) -> Check:
-    """A check of one demand."""
     value, limit = values
     what, side = _WORDS[name]
     when = f" when {instant_text(instant)}" if instant is not None else ""

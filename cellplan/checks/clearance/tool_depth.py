@@ -15,7 +15,6 @@ def check_depths(cell: Cell, depths: Sequence[ToolDepth]) -> list[Check]:
 
 
 def _check(task: Task, tool_depth: ToolDepth) -> Check:
-    """The check of one task."""
     depth, limit = MM * tool_depth.depth, MM * tool_depth.limit
     passed = tool_depth.depth <= tool_depth.limit + DEPTH_TOL
     what = "its axis" if tool_depth.body == AXIS else f"{tool_depth.robot}/{tool_depth.body}"

@@ -83,7 +83,6 @@ def check_accelerations(cell: Cell, accelerations: MotionAccelerations) -> list[
 
 
 def _joints(robot: Robot, times: Array, q: Array, *, judged: Flags, jumps_at: Array) -> Iterator[JointAcceleration]:
-    """Every joint of one robot."""
     signed = np.where(judged[:, None], point_accelerations(times, q), 0.0)
     rows = joint_accelerations(times, q, cycle=robot.controller_cycle, jumps_at=jumps_at)
     sizes = np.where(judged[:, None], rows.values, 0.0)

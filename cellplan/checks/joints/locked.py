@@ -70,6 +70,5 @@ def _check(cell: Cell, lock: LockedJointEntry, times: Array, q: Array) -> Check:
 
 
 def _verdict(lock: LockedJointEntry, message: str, *, value: float, unit: str, at_s: float | None) -> Check:
-    """The check of one joint."""
     joint, limit = f"{lock.robot}/{lock.joint}", STANDSTILL_TOL
     return Check("locked_joint", joint, value <= limit, message, value=value, limit=limit, unit=unit, at_s=at_s)

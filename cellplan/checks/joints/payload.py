@@ -66,7 +66,6 @@ def check_payload_at_rest(cell: Cell, chains: Chains, start: Array) -> list[Chec
 
 
 def _load_use(cell: Cell, robot: Robot, chain: ScrewChain, *, times: Array, q: Array) -> LoadUse:
-    """Load of one robot."""
     grasp = next((grasp for grasp in cell.part.held_by if grasp.robot == robot.name), None)
     share = None if cell.part.mass is None else cell.part.mass / max(1, len(cell.positioners))
     use = LoadUse(
@@ -170,7 +169,6 @@ def _checks(use: LoadUse) -> list[Check]:
 
 
 def _mass_check(use: LoadUse, limits: PayloadEntry) -> Check:
-    """The mass against the payload."""
     masses = []
     if use.tool_mass is None or use.tool_mass > 0.0:
         masses.append(f"tool {use.tool_mass:.4g} kg" if use.tool_mass is not None else "tool mass not stated")

@@ -67,7 +67,6 @@ def init(options: InitOptions) -> Result | None:
 
 
 def _show_list(templates: "tuple[Template, ...]", *, as_json: bool) -> None:
-    """All templates, one line each."""
     if as_json:
         say_json(
             {"schema": InitOptions.SCHEMA, "templates": [{"name": t.name, "summary": t.summary} for t in templates]}
@@ -91,7 +90,6 @@ def _rank(name: str) -> tuple[bool, int, str]:
 
 
 def _commands(folder: Path) -> list[str]:
-    """The next commands."""
     from shlex import quote
 
     enter = [] if folder.resolve() == Path.cwd() else [f"cd {quote(str(folder))}"]

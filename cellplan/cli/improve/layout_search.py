@@ -141,7 +141,6 @@ def _quantity(option: str, text: str | None, read: Callable[[str, str], Value]) 
 
 
 def _word(option: str, text: str, kind: type[Choice]) -> Choice:
-    """One of the words of an option."""
     known = [str(member) for member in kind]
     if text not in known:
         raise InputError(f"{option}: expected one of {listed(known)}, got {shown(text)}{did_you_mean(text, known)}")

@@ -70,7 +70,6 @@ def refuse_ignored(command: Any, ctx: Any, args: list[str]) -> None:
 
 
 def _name(option: Any) -> str:
-    """The long name of an option."""
     return max(option.opts, key=len)
 
 

@@ -157,7 +157,6 @@ def _escapes(
 
 
 def _choice(options: ExportOptions) -> "Choice":
-    """What of the run is exported, and how."""
     from cellplan.model.report.exported import Moves, Promise
     from cellplan.programs.export.choice import Choice
 

@@ -66,7 +66,6 @@ def floor_plan(options: FloorPlanOptions) -> None:
 
 
 def _format(form: str | None, output: Path | None) -> str:
-    """The format that is asked for."""
     ending = "" if output is None else output.suffix.removeprefix(".").lower()
     if form is not None and form not in FORMATS:
         raise InputError(f"--format: expected svg or dxf, got '{form}'")

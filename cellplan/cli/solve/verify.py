@@ -62,7 +62,6 @@ def verify(options: VerifyOptions) -> Result:
 
 
 def _verified_run(options: VerifyOptions) -> Result:
-    """Verify a run."""
     from cellplan.cli.next_steps import export_line
     from cellplan.report.text.run import count_text, figure_lines, motion_text, read_record
     from cellplan.runs.gate.open_gate import open_gate
@@ -108,7 +107,6 @@ def _verified_programs(options: VerifyOptions) -> Result:
 
 
 def _about(options: VerifyOptions, run: "VerifiedRun", files: int, remarks: "Sequence[str]") -> dict[str, object]:
-    """What was verified, for machines."""
     status = {"schema": options.schema, "status": "verified", "exit": int(ExitStatus.PASSED)}
     about = {"folder": str(options.run), "cell": run.cell.name, "run": run.digest, "files": files}
     return {**status, **about, "inputs": list(run.inputs_compared), "remarks": list(remarks)}

@@ -175,7 +175,6 @@ def _entry(node: dict[str, Any], steps: list[str], annotation: Any) -> tuple[str
 
 
 def _is_pose(annotation: Any) -> bool:
-    """Whether an entry is a pose, or has one."""
     return isinstance(annotation, type) and issubclass(annotation, PoseEntry)
 
 

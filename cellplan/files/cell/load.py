@@ -198,7 +198,6 @@ def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:
 
 
 def _models(valid: ValidEntries, document: YamlDocument, sources: Sources) -> dict[str, RobotModel]:
-    """Models of all valid robots by name."""
     read = {name: sources.robot(name, entry) for name, entry in valid.robots.items()}
     for name in valid.names["robots"]:
         written = document.root["robots"][name]

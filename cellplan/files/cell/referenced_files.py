@@ -207,7 +207,6 @@ class Sources:
         return table.model
 
     def _urdf(self, name: str, entry: RobotEntry) -> RobotModel | None:
-        """Model from a URDF and its meshes."""
         path, limits = ("robots", name, "model"), entry.moveit_limits
         place, folders = self._file(entry.model, path), self._package_dirs(name, entry)
         moveit = None if limits is None else self._file(limits, ("robots", name, "moveit_limits"))

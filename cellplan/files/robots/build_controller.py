@@ -120,7 +120,6 @@ def sense_findings(
 def _names(
     path: KeyPath, what: str, given: Iterable[str], known: Collection[str], document: YamlDocument
 ) -> Iterator[Finding]:
-    """Keys that name a known joint."""
     for joint in given:
         if joint not in known:
             yield document.key_finding((*path, joint), unknown_name(what, joint, known))

@@ -84,7 +84,6 @@ def read_stored_run(folder: Path) -> StoredRun:
 
 
 def _manifest(folder: Path) -> tuple[Manifest, str]:
-    """The manifest and its digest."""
     if not folder.is_dir():
         what = "a file" if folder.exists() else "nothing"
         raise InputError(f"{folder}: expected the folder of a run, got {what}")

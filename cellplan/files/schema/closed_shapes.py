@@ -51,7 +51,6 @@ class CircleEntry(ClosedShapeEntry):
 
     @model_validator(mode="after")
     def _starts_somewhere(self) -> Self:
-        """A start in the plane."""
         start_direction(self.start_at, self.plane)
         return self
 
@@ -69,7 +68,6 @@ class RectangleEntry(ClosedShapeEntry):
 
     @model_validator(mode="after")
     def _starts_at_a_corner(self) -> Self:
-        """One of the four corners."""
         if not all(abs(part) == 1.0 for part in self.start_at):
             corner = f"[{self.start_at[0]:g}, {self.start_at[1]:g}]"
             raise rule(f"expected a corner: [1, 1], [-1, 1], [-1, -1] or [1, -1], got {corner}", "start_at")
@@ -89,7 +87,6 @@ class RhombusEntry(ClosedShapeEntry):
 
     @model_validator(mode="after")
     def _starts_at_a_corner(self) -> Self:
-        """One of the four corners."""
         u, v = start_direction(self.start_at, self.plane)
         if u and v:
             raise rule(f"expected a corner: [1, 0], [0, 1], [-1, 0] or [0, -1], got [{u:g}, {v:g}]", "start_at")

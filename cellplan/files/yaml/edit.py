@@ -73,7 +73,6 @@ def edited_text(text: str, values: Mapping[KeyPath, object]) -> str:
 
 
 def _nodes(text: str) -> dict[KeyPath, _Node]:
-    """Every value of the text by its key path."""
     nodes: dict[KeyPath, _Node] = {}
     events: Iterator[Any] = iter(yaml.parse(text, Loader=yaml.SafeLoader))
     root: Any = next(event for event in events if isinstance(event, yaml.MappingStartEvent))
@@ -136,7 +135,6 @@ def _removal(text: str, nodes: Mapping[KeyPath, _Node], path: KeyPath) -> Iterat
 
 
 def _line_end(text: str, index: int) -> int:
-    """Index of the end of the line in which a place is."""
     end = text.find("\n", index)
     return len(text) if end < 0 else end
 

@@ -148,7 +148,6 @@ def _checked_mesh(loose: Triangles, name: str, *, scale: Array) -> Mesh:
 
 
 def _is_collada(name: str) -> bool:
-    """Whether a file is COLLADA, by its name."""
     return name.lower().endswith(".dae")
 
 

@@ -129,7 +129,6 @@ def _cut(polygon: Polygon, start: tuple[float, float], end: tuple[float, float])
 
 
 def _is_wider(polygon: Polygon, tolerance: float) -> bool:
-    """Whether a polygon is wider than the tolerance."""
     if len(polygon) < 3:
         return False
     ahead = [*polygon[1:], polygon[0]]

@@ -103,7 +103,6 @@ def map_record(
 
 
 def _place(jobs: Sequence[MapJob], verdict: PlaceVerdict, place: int) -> dict[str, Any]:
-    """One place."""
     job, places = jobs[verdict.phase], jobs[0].places
     reason = _reason(job, verdict)
     return {
@@ -255,7 +254,6 @@ def _step(record: Record) -> float:
 
 
 def _colour(place: Record, classes: list[tuple[str, float, float]]) -> str:
-    """Colour of a place."""
     if place["verdict"] != "passes":
         return COLOURS[place["verdict"]]
     return next((c for c, _, last in classes if place["figures"]["cycle_s"] <= last), classes[-1][0])

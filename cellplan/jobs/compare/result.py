@@ -141,7 +141,6 @@ def _verdict(variant: Record) -> str:
 
 
 def _differences(record: Record) -> list[str]:
-    """Inputs that differ."""
     differences = record["differences"]
     if record["of"] == "modes":
         return []

@@ -287,7 +287,6 @@ def _wrapped(head: str, text: str) -> list[str]:
 
 
 def _width(names: Iterable[str]) -> int:
-    """Width of the longest name."""
     return max(map(len, names), default=0)
 
 

@@ -135,7 +135,6 @@ def _is_floor_plan(path: Path) -> bool:
 
 
 def _of_run(request: FloorPlanRequest) -> FloorPlan:
-    """The floor plan of a run on disk."""
     stored = read_stored_run(request.path)
     _refuse_place(request, stored.manifest.cell)
     cell = load_stored_cell(
@@ -151,7 +150,6 @@ def _of_run(request: FloorPlanRequest) -> FloorPlan:
 
 
 def _of_cell(cell: Cell, progress: Progress) -> FloorPlan:
-    """The floor plan of a cell that was not solved."""
     try:
         started, state = check(cell, progress=progress).cell, "Robots at the start"
     except (InputError, NoSolutionError):
@@ -183,7 +181,6 @@ def pendant_frames(cell: Cell, known: Mapping[str, Sequence[Station]] | None) ->
 
 
 def _of_robot(cell: Cell, robot: Robot, known: Sequence[Station] | None) -> PlanPendant:
-    """The frames of one robot."""
     control = robot.control
     entry = None if control is None else cell.controllers.get(control.id)
     convention = convention_of(None if entry is None else entry.kind)

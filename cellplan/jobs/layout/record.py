@@ -245,7 +245,6 @@ def _is_same(one: CandidateRecord, other: CandidateRecord) -> bool:
 
 
 def _candidate(ready: PreparedSearch, trial: StudyTrial, certified: CandidateResult | None) -> CandidateRecord:
-    """One layout."""
     figures, ready = trial.figures, _prepared_of(ready, trial)
     x, start = np.array(figures["x"]), np.array(figures["start"])
     status, reason = "conforming" if trial.passed else "violating", ""

@@ -199,7 +199,6 @@ def _record_card(record: Record) -> Card:
 
 
 def _grid(caption: str, columns: Mapping[str, Any], names: Sequence[str], table: str) -> Grid:
-    """Some columns of a table, all of them without names."""
     selected = {name: columns[name] for name in names if name in columns} if names else dict(columns)
     shown = {name: values.tolist() if isinstance(values, np.ndarray) else values for name, values in selected.items()}
     return Grid(caption=caption, columns=shown, more=f'to_frame("{table}")')

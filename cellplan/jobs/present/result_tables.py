@@ -132,7 +132,6 @@ def record_at(path: Path) -> Record:
 
 
 def _is_run(path: Path) -> bool:
-    """Whether a path is the folder of a run."""
     return all((path / name).is_file() for name in (MANIFEST, "report.json"))
 
 
@@ -268,7 +267,6 @@ def _limits(joint: Joint, start: float | None) -> Row:
 
 
 def _task_row(task: Task) -> Row:
-    """A task as it is written."""
     return {
         "task": task.name,
         "robot": task.robot,

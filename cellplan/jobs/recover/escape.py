@@ -226,7 +226,6 @@ def _tracks(
 def _programs(
     run: VerifiedRun, prepared: PreparedExport, form: EscapeForm, main: ProgramRows, routes: Sequence[Homeward]
 ) -> dict[str, EscapeProgram]:
-    """The escape program of each robot that is exported."""
     frame, cell, programs = prepared.job.frame, run.cell, dict[str, EscapeProgram]()
     for name in frame.robots:
         passed = main.robots[name]

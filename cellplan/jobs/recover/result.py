@@ -81,7 +81,6 @@ def _state(recovery: Recovery) -> dict[str, Any]:
 
 
 def _phase(phase: TimedPhase) -> dict[str, Any]:
-    """One phase as data."""
     return {
         "kind": phase.kind,
         "robots": list(phase.robots),

@@ -206,7 +206,6 @@ def _judged_from(schedule: Schedule) -> dict[str, int]:
 
 
 def _iso_figures(job: Pass, trials: Sequence[tuple[TaskAccuracy, ...]]) -> dict[str, IsoFigures]:
-    """Figures of ISO 9283 of every task over all trials."""
     figures = {}
     times = job.schedule.times
     for place, scheduled in enumerate(job.schedule.tasks):

@@ -189,7 +189,6 @@ def _round_figures(cell: Cell, run: RunRehearsal, task: str) -> dict[str, Figure
 
 
 def _rounds(curves: Sequence[Array], *, title: str, unit: str, allowed: float) -> PlotPanel:
-    """Errors by round."""
     items: list[Item] = [Limit(allowed, f"tolerance {allowed:.6g} {unit}")]
     for number, curve in enumerate(curves):
         colour, rounds = ROBOTS[number % len(ROBOTS)], np.arange(float(len(curve)))

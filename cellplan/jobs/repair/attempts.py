@@ -161,7 +161,6 @@ def _owner(cell: Cell, variable: VaryRange) -> str:
 
 
 def _rod_ranges(rod: Rod) -> dict[str, list[float]]:
-    """Ranges of a rod about what it is."""
     length = MM * rod.length
     shortest = max(SHORTER * length, LEAST_MORE * MM * rod.shortest)
     tilt = max(MOST_TILT, DEG * abs(rod.tilt))

@@ -345,7 +345,6 @@ def _arrows(parts: Mapping[str, tuple[Any, Any]]) -> str:
 
 
 def _effect(check: Mapping[str, Any], old: float, new: float, unit: str, text: str) -> EffectRecord:
-    """One effect."""
     return {
         "check": check["name"],
         "subject": check["subject"],

@@ -111,7 +111,6 @@ def _given(record: Record) -> Iterator[str]:
 
 
 def _remedy(number: int, remedy: Record, cell: Path) -> Iterator[str]:
-    """One remedy."""
     yield f"    {number}. {remedy['text']} (cost {remedy['cost']:.2f})"
     if remedy["effects"]:
         yield f"       {effects_text(remedy)}"

@@ -54,7 +54,6 @@ def robot_records(cell: Cell) -> list[Record]:
 
 
 def _robot(cell: Cell, robot: Robot, colour: str) -> Record:
-    """One robot."""
     model = robot.model
     return {
         "name": robot.name,
@@ -80,7 +79,6 @@ def _robot(cell: Cell, robot: Robot, colour: str) -> Record:
 
 
 def _axis(robot: Robot, link: int) -> Record:
-    """The axis that moves a link."""
     axis, drive = robot.model.axes[link], robot.model.drive(link)
     return {
         "parent": axis.parent,
@@ -213,5 +211,4 @@ def base_records(cell: Cell) -> list[Record]:
 
 
 def _file_numbers(values: Iterable[float]) -> list[float]:
-    """Numbers as a cell file has them."""
     return [round(float(value), FILE_DECIMALS) + 0.0 for value in values]

@@ -103,7 +103,6 @@ def mesh_record(mesh: Mesh, limit: int) -> Record:
 
 
 def _plain(*values: float) -> Numbers:
-    """Dimensions as plain numbers."""
     return [round(float(value), _ROUNDED) for value in values]
 
 

@@ -136,7 +136,6 @@ def _moving(standing: Record, scene: Scene) -> Record:
 
 
 def _facts(layout: Record) -> list[list[str]]:
-    """The figures of a layout."""
     facts = [["from", str(layout["origin"])]]
     for key, label, unit in FIGURES:
         if layout[key] is not None:
@@ -247,7 +246,6 @@ def _view_of_run(request: ViewRequest, progress: Progress) -> ViewRecord:
 
 
 def _record_of_run(stored: StoredRun, cell: Cell) -> ViewRecord:
-    """The record of a run that was read."""
     geometries = Geometries()
     scene = run_scene(stored, cell, geometries)
     return {**_record("run", cell, geometries, [scene]), "source": stored.manifest.cell_file}
@@ -265,7 +263,6 @@ def _view_of_study(request: ViewRequest, progress: Progress) -> ViewRecord:
 
 
 def _record(kind: str, cell: Cell, geometries: Geometries, scenes: list[Record]) -> ViewRecord:
-    """A page."""
     return {
         "schema": SCHEMA,
         "kind": kind,

@@ -212,7 +212,6 @@ class ReadStatement(NamedTuple):
 
 
 def _what(statement: ReadStatement) -> dict[str, str]:
-    """What a statement switches."""
     return {key: word for key, word in statement.words.items() if key not in {"state", "routine"}}
 
 

@@ -114,7 +114,6 @@ def _same_branch(chain: ScrewChain, relation: Relation, robot: Robot, X_PT: Arra
 
 
 def _moved(relation: Relation, robot: Robot, q: Array, off: tuple[float, float], *, run: str) -> MovedStart:
-    """How far a start was moved."""
     moves = q - np.asarray(robot.start)
     most = robot.model.joints[int(np.argmax(np.abs(moves)))]
     return MovedStart(

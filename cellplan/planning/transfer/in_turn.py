@@ -84,7 +84,6 @@ class InTurn:
         return self._over_gaps.get((robot, moved), straight) if move is None else move.line.q
 
     def _manner(self, robot: str, moved: frozenset[str]) -> str:
-        """How a robot moves in a try."""
         if self._known_move(robot, moved) is not None:
             return ""
         return ", straight over the gap between its trees" if (robot, moved) in self._over_gaps else " straight"

@@ -215,7 +215,6 @@ def _ends(wall: PlanWall, low: Array, high: Array) -> tuple[tuple[float, float],
 
 
 def _closed(space: "Modelspace", line: Array, attributes: dict[str, object]) -> None:
-    """A closed line."""
     space.add_lwpolyline(_points(line), close=True, dxfattribs=attributes)
 
 

@@ -329,7 +329,6 @@ def _points(line: Array) -> str:
 
 
 def _text(kind: str, x: float, y: float, words: str) -> str:
-    """A line of text."""
     return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}">{escape(words)}</text>'
 
 
@@ -343,7 +342,6 @@ def style(colours: Sequence[str]) -> str:
 
 
 def _of_robot(number: int, colour: str) -> str:
-    """Rules of one robot."""
     stroked = ", ".join(f".plan-sheet .{kind}.r{number}" for kind in ("robots", "swept", "reach", "path"))
     filled = ", ".join(f".plan-sheet .{kind}.r{number}" for kind in ("robots", "swept"))
     return f"{stroked} {{ stroke: {colour}; }}\n{filled}, .plan-sheet .n{number} {{ fill: {colour}; }}\n"

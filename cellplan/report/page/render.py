@@ -82,7 +82,6 @@ def _up(phase: str | None) -> str:
 
 
 def _tables(files: Collection[str], folder: str, up: str) -> Links:
-    """The tables in one folder."""
     names = sorted(name for name in files if PurePosixPath(name).parent == PurePosixPath(folder))
     return [(PurePosixPath(name).stem, f"{up}{quote(name)}") for name in names]
 
@@ -142,7 +141,6 @@ def _phase_parts(record: Record, cell: Cell) -> dict[str, object]:
 
 
 def _links(record: Record, plots: Iterable[str], pictures: PageFiles) -> dict[str, Links]:
-    """Files that a page leads to."""
     names = ["report.json", "series.json"] if is_of_phase(record) else ["report.json"]
     names += [name for name, text in ((STILL, pictures.get("still")), (FLOOR_PLAN, pictures.get("floor_plan"))) if text]
     return file_links(pictures.get("files", ()), plots, names, phase=record.get("phase"))

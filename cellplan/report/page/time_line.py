@@ -71,7 +71,6 @@ def _phases(record: Record) -> Entries:
 
 
 def _spans(phase: Record, robot: str, records: Record, tasks: Mapping[str, Task]) -> Iterator[Span]:
-    """What one robot does in a phase."""
     role, begin, end = phase["roles"].get(robot, "hold"), phase["begin_s"], phase["end_s"]
     name = role.removeprefix(WORK)
     if role.startswith(WORK) and name in records and name in tasks:
@@ -112,7 +111,6 @@ def _ticks(total: float) -> list[float]:
 
 
 def _placed(span: Span, total: float) -> dict[str, Any]:
-    """A span with its place in percent."""
     return {
         "kind": span.kind,
         "text": span.text,

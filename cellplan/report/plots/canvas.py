@@ -132,7 +132,6 @@ def _panel(box: PlacedPanel, *, is_plane: bool) -> Iterator[Artist]:
 
 
 def _line(box: PlacedPanel, x: Any, y: Any, **pen: Any) -> Line2D:
-    """A line in a panel."""
     return Line2D(box.left + np.asarray(x), box.top + np.asarray(y), **{"linewidth": 0.8, **pen})
 
 
@@ -159,7 +158,6 @@ def _item(box: PlacedPanel, item: object, order: float) -> Iterator[Artist]:
 
 
 def _text(words: Words) -> Text:
-    """A line of text."""
     weight = "bold" if words.is_bold else "normal"
     anchor = _ANCHORS[words.anchor]
     return Text(words.x, words.y, words.text, size=words.size, color=words.colour, weight=weight, ha=anchor, zorder=5.0)

@@ -103,7 +103,6 @@ def placed(figure: Figure) -> PlacedFigure:
 
 
 def _entry(key: LegendKey, left: float, y: float) -> Words:
-    """A text of the legend."""
     x = left + SWATCH[0] + 6.0 if key.colour else left
     return Words(x, y + 8.0 * MIDDLE, key.text, colour=key.ink or INK, is_bold=key.is_bold)
 
@@ -139,7 +138,6 @@ def _panel(
     *,
     has_x_labels: bool,
 ) -> PlacedPanel:
-    """A panel with its texts."""
     box = PlacedPanel(
         panel=panel,
         x=figure.x,

@@ -97,7 +97,6 @@ def _swatches(placement: PlacedFigure) -> Iterator[str]:
 
 
 def _panels(placement: PlacedFigure) -> Iterator[str]:
-    """Every panel."""
     is_plane = placement.figure.is_plane
     for box in placement.panels:
         y = box.panel.y

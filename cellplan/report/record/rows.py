@@ -101,7 +101,6 @@ def curve_columns(tree: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _joints(record: Record) -> Iterator[Row]:
-    """A row for each joint of every robot."""
     for robot, joints in record["joints"].items():
         yield from ({"robot": robot, **row} for row in by_name(joints, "joint"))
 

@@ -78,7 +78,6 @@ def _schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) 
 
 
 def _record_schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) -> dict[str, Any]:
-    """The schema of a record type."""
     hints = get_type_hints(form, include_extras=True)
     schema = {
         "type": "object",

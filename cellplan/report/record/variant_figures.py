@@ -150,7 +150,6 @@ def _load(figures: Figures, robot: str) -> float:
 
 
 def _joint(joint: Record) -> dict[str, Any]:
-    """Use of one joint."""
     lower, upper, margin = joint["lower"], joint["upper"], joint["margin"]
     half = None if None in {lower, upper} or margin is None else 0.5 * (upper - lower)
     return {

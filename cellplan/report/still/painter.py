@@ -121,7 +121,6 @@ class Painter:
         return pieces
 
     def _class(self, material: str, tone: int) -> str:
-        """Name of the class of a material in a tone."""
         key = (material, tone)
         if key not in self.classes:
             self.classes[key] = f"{'l' if tone == LINE else 'c'}{len(self.classes)}"

@@ -55,7 +55,6 @@ def rules(prefix: str, used: Iterable[tuple[str, Colour, int]]) -> tuple[str, st
 
 
 def _paint(colour: str, tone: int) -> str:
-    """Declarations of a colour in a tone."""
     if tone == LINE:
         return f"fill:none;stroke:{colour};stroke-linecap:round"
     value = tone_colour(colour, tone)

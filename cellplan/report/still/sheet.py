@@ -128,7 +128,6 @@ def _framing(picture: StillPicture) -> tuple[Camera, DetailWindow | None]:
 
 
 def _described(picture: StillPicture) -> str:
-    """What is on the picture, in words."""
     names = ", ".join(name.text for name in picture.names)
     return " ".join([*(f"{note}." for note in picture.notes), f"Robots: {names}." if names else ""]).strip()
 

@@ -84,7 +84,6 @@ def no_accurate_mode(method: MethodName) -> str:
 
 
 def _counted(count: int, what: str) -> str:
-    """A count with its noun."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 

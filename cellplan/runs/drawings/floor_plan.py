@@ -90,7 +90,6 @@ def _solid(body: SceneBody) -> Solid:
 
 
 def _robot(robot: Robot, colour: str, squares: Mapping[str, Indices]) -> PlanRobot:
-    """A robot of the plan."""
     first = robot.model.axes[0] if robot.model.axes else None
     centre = robot.X_WB[:3, 3] if first is None else transform_points(robot.X_WB, first.point_B[None])[0]
     is_round = has_round_reach(robot)
@@ -125,7 +124,6 @@ def _outline(body: SceneBody, corners: Array) -> PlanOutline:
 
 
 def _paths(cell: Cell, paths: TaskPoints, chains: Chains, at: Mapping[str, Array]) -> Iterable[PlanPath]:
-    """Paths where the part is."""
     X_WP = cell.part.X_CP
     if cell.part.held_by:
         holder = cell.part.held_by[0].robot

@@ -61,7 +61,6 @@ def work_phases(cell: Cell, robot: str, progress: Progress = silent) -> Iterator
 
 
 def _work_phase(stage: Stage, begun: BegunStage, phase: Phase) -> WorkPhase:
-    """One phase of a stage."""
     cell, scene = begun.scene.cell, scene_of_run(begun.scene, phase.tasks)
     is_present = present_pairs(scene, phase)
     pairs = tuple(pair for pair, present in zip(scene.pairs, is_present, strict=True) if present)

@@ -57,7 +57,6 @@ def _side_by_side(first: Solid, second: Solid, y: float) -> tuple[Engine, BodyPo
 
 
 def _refuses(X: Array) -> bool:
-    """Whether a pose is refused."""
     try:
         checked_poses([X])
     except CellplanError:

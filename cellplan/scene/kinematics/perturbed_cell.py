@@ -63,7 +63,6 @@ def _draw_robot(robot: Robot, errors: RobotErrorsEntry, rng: np.random.Generator
 
 
 def _draw_pose(amounts: PoseErrorEntry, rng: np.random.Generator) -> Array:
-    """A small pose."""
     return pose([sample(amount, rng) for amount in amounts.xyz_mm], [sample(amount, rng) for amount in amounts.rpy_deg])
 
 

@@ -79,7 +79,6 @@ def _unit(measures: Measures, demands: Demands) -> float:
 def _bound(
     problem: Problem, measures: Measures, rows: ConstraintRows, multipliers: Array, unit: float
 ) -> list[BindingRow]:
-    """The rows of one kind that bind."""
     units = {
         MeasureKind.DISTANCE: LENGTH,
         MeasureKind.LOWER_LIMIT: ANGLE,

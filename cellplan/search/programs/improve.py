@@ -183,7 +183,6 @@ class _Climb:
                 return 1.0
 
     def _state(self, point: Point) -> _State:
-        """How a point stands."""
         measures = Measures.of(self._problem, point, self._demands, self._effort)
         return _State(
             measures=measures,
@@ -204,7 +203,6 @@ class _Climb:
         )
 
     def _result(self, best: _State) -> Improved:
-        """The best point."""
         point = best.measures.point
         return Improved(
             x=point.x,

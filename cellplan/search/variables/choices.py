@@ -60,7 +60,6 @@ class Choices:
         return self.cell.program.is_home_to_home or len(set(robots)) == len(robots)
 
     def _values(self, picks: tuple[str, ...]) -> dict[str, object]:
-        """One combination."""
         values, document = dict[str, object](), cast("dict[str, Any]", self.cell.origin.document)
         for choice, pick in zip(self.chosen, picks, strict=True):
             if pick != self._present(choice):

@@ -125,7 +125,6 @@ def _is_full_turn(variable: VaryRange) -> bool:
 
 
 def _usual(variable: VaryRange) -> float:
-    """A usual step."""
     if variable.kind is VariableKind.WEIGHT:
         return USUAL_FACTOR
     return USUAL_ANGLE if variable.is_angle else USUAL_LENGTH

@@ -267,7 +267,6 @@ def neighbour_cells(state: State, cell: Cell, tied: Tied, step: float) -> Iterat
 
 
 def _with_tool(state: State, cell: Cell, index: int) -> Cell:
-    """The cell with the tool of one robot."""
     robots = list(cell.robots)
     robots[index] = replace(robots[index], tool=state.tool(cell, index))
     return replace(cell, robots=tuple(robots))

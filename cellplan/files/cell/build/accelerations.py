@@ -22,7 +22,6 @@ def acceleration_rule(entry: RobotEntry, cell: AccelerationChoice | None, *, joi
 
 
 def _chosen(choice: AccelerationChoice | None) -> AccelerationRule:
-    """The rule of an entry."""
     if choice is None:
         return USUAL_ACCELERATION
     if isinstance(choice, AccelerationRuleEntry):

@@ -325,7 +325,6 @@ def _polyline(entry: PolylineEntry) -> PathSpec:
 
 
 def _time_law(law: str | TrapezoidEntry) -> TimeLaw:
-    """A time law with its ramp."""
     if isinstance(law, TrapezoidEntry):
         return TimeLaw(kind=TimeLawKind.TRAPEZOID, ramp=law.trapezoid.ramp)
     return TimeLaw(kind=TimeLawKind(law))

@@ -69,7 +69,6 @@ def _cycle(path: KeyPath, robot: RobotEntry, document: YamlDocument) -> Iterator
 def _of_kind(
     path: KeyPath, control: RobotControlEntry, entry: ControllerEntry, document: YamlDocument
 ) -> Iterator[Finding]:
-    """Keys that the kind of the controller has, and a task that it has."""
     if control.task is not None and entry.kind != "abb":
         text = f"unexpected key, it applies to kind abb only, and '{control.id}' is of kind {entry.kind}"
         yield document.key_finding((*path, "task"), text)
@@ -178,7 +177,6 @@ def _process_outputs(valid: ValidEntries, uses: Uses, document: YamlDocument) ->
 
 
 def _article(noun: str) -> str:
-    """A noun with its article."""
     return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
 
 

@@ -150,7 +150,6 @@ def mounted_names(entry: RobotEntry) -> tuple[str, ...]:
 
 
 def _mount_names(entry: RobotEntry) -> tuple[str, ...]:
-    """Names of the bodies that a robot is mounted on."""
     path, column = _column(entry)
     below = () if column is None else (PEDESTAL if path[-1] == PEDESTAL else MOUNT,)
     return (*below, *(_rail_body_name(key, index) for key, index, _ in rail_entries(entry)))

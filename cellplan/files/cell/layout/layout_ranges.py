@@ -93,7 +93,6 @@ def _of_true(address: Address, path: KeyPath, context: Context) -> Iterator[Rang
 
 
 def _by_joint(address: Address, value: tuple[Any, ...], path: KeyPath, context: Context) -> Iterator[RangeOrFinding]:
-    """One range for each joint."""
     count = len(address.parts)
     if len(value) != count:
         yield context.document.finding(path, f"expected {count} ranges [low, high], one per joint, got {len(value)}")
@@ -127,7 +126,6 @@ def in_si_of(address: Address, value: float, *, is_angle: bool) -> float:
 def _named(
     address: Address, index: int, bounds: tuple[float, float], *, given: float | None, is_angle: bool
 ) -> VaryRange:
-    """The range of one number."""
     return VaryRange(
         address=f"{address.group}{address.parts[index]}",
         kind=KINDS[address.what],
@@ -167,7 +165,6 @@ def _of_pose(pose: PoseEntry, index: int) -> tuple[float, bool]:
 
 
 def _rod(entry: RobotEntry) -> RodEntry:
-    """The rod of a tool that has one."""
     if entry.tool.rod is None:
         raise ValueError("a tool without a rod")
     return entry.tool.rod

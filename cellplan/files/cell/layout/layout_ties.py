@@ -120,7 +120,6 @@ class Ties:
         return range_
 
     def _address(self, key: str, path: KeyPath) -> Address | None:
-        """What an address names."""
         try:
             return read_address(key, self._context.valid, self._context.models)
         except AddressError as error:

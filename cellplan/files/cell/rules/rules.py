@@ -92,7 +92,6 @@ def _wrong_holder(robot: str, holders: Sequence[str], valid: ValidEntries, *, is
 
 
 def _known_robot(robot: str, valid: ValidEntries, document: YamlDocument, path: KeyPath) -> Iterator[Finding]:
-    """A robot that the cell has."""
     known = valid.names["robots"]
     if robot not in known:
         yield document.finding(path, unknown_name("a robot of this cell", robot, known))

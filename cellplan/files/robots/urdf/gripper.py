@@ -87,7 +87,6 @@ def require_opposed(
 
 
 def _leaders(tree: UrdfTree, flange: str, state: GripperState, locked: Collection[str]) -> list[UrdfJoint]:
-    """The joints that a gripper is opened by."""
     document, driven = tree.document, _driven_to(tree, flange, locked)
     movable = [
         joint
@@ -158,7 +157,6 @@ def _fingers(document: UrdfDocument, leader: UrdfJoint) -> list[Finger]:
 
 
 def _followers(document: UrdfDocument, leader: UrdfJoint) -> list[tuple[UrdfJoint, UrdfMimic]]:
-    """The joints that follow another one, and how."""
     mimics = [(joint, joint.mimic) for joint in document.joints.values()]
     return [(joint, mimic) for joint, mimic in mimics if mimic and mimic.leader == leader.name]
 
@@ -212,5 +210,4 @@ def _middle(link: str, bodies: Sequence[Body], u: Array) -> float:
 
 
 def _words(fingers: Sequence[Finger]) -> str:
-    """The fingers by their joints."""
     return " and ".join(f"'{finger.joint.name}'" for finger in fingers)

@@ -221,7 +221,6 @@ def _axis_in_base(joint: UrdfJoint, configuration: ZeroConfiguration) -> tuple[A
 
 
 def _kind(joint: UrdfJoint) -> JointKind:
-    """How the joint moves."""
     return JointKind.PRISMATIC if joint.kind == "prismatic" else JointKind.REVOLUTE
 
 

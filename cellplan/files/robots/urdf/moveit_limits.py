@@ -82,7 +82,6 @@ def _narrowed(limit: UrdfLimit, moveit: StatedLimits, *, slides: bool, turns_on:
 
 
 def _limits(entry: Mapping[str, Any]) -> StatedLimits:
-    """What one joint states."""
     rates = {name: float(entry[f"max_{name}"]) if _states(entry, name) else None for name in RATES}
     lower, upper = (float(entry[end]) if _states(entry, "position") and end in entry else None for end in ENDS)
     ramps = [rate for rate in (rates["acceleration"], rates["deceleration"]) if rate is not None]

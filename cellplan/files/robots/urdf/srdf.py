@@ -150,7 +150,6 @@ def configuration_of(srdf: Srdf, name: str, model: RobotModel, *, added: Collect
 
 
 def _configuration(state: Element) -> NamedConfiguration:
-    """A named configuration."""
     name = state.text("name", "group_state")
     joints: dict[str, Element] = {}
     for joint in state.all("joint"):

@@ -234,7 +234,6 @@ def _obj_index(word: str, *, known: int, place: str) -> int:
 
 
 def _numbers(words: Iterable[str], *, count: int, place: str) -> list[float]:
-    """Exactly ``count`` numbers."""
     given = list(words)
     try:
         numbers = [float(plain_word(word)) for word in given]

@@ -270,7 +270,6 @@ class _Corners:
         return [self._verdict(trial) for trial in trials]
 
     def _verdict(self, trial: StudyTrial) -> _Verdict:
-        """The verdict of one trial."""
         figures, demanded = trial.figures, DEG * float(self.finish.ready.variables.margin.max(initial=0.0))
         margin = figures.get("margin_deg")
         is_mendable = bool(figures) and (not figures["is_apart"] or (margin is not None and margin < demanded))

@@ -141,7 +141,6 @@ class Standing:
             yield MM * float(violations[row]), {"kind": "distance", "subject": names, "text": text}
 
     def _bounds(self) -> Iterator[LimitRecord]:
-        """Variables at their bounds."""
         problem, x = self.problem, self.measures.point.x
         near = 1e-6 * problem.scale
         for place, name in enumerate(problem.names):

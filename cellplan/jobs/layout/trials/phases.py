@@ -194,7 +194,6 @@ def _begins_there(planned: PlannedStage) -> bool:
 
 
 def _variables(variables: Variables, planned: PlannedStage) -> PhaseVariables:
-    """The variables as a phase has them."""
     stage = planned.stage
     lying = None if stage.place is None else stage.cell.part
     tasks = tuple(stage.phase.tasks)

@@ -193,7 +193,6 @@ def read_solid(element: Element, owner: str) -> UrdfSolid:
 
 
 def _shape(element: Element, owner: str) -> Box | Cylinder | Capsule | Sphere | UrdfMesh:
-    """Shape of a geometry element."""
     match element.tag:
         case "box":
             x, y, z = _sizes(element, "size", 3, owner=owner)
@@ -236,7 +235,6 @@ def _scale(element: Element, owner: str) -> tuple[float, float, float]:
 
 
 def _joint(element: Element, remarks: Remarks) -> UrdfJoint:
-    """One joint."""
     name = _name(element)
     owner = f"joint '{name}'"
     kind = element.text("type", owner)
