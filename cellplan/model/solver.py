@@ -36,11 +36,6 @@ class MethodTraits:
         """Whether the motion can also be resolved by collocation (the integrator ``accurate``)."""
         return not self.steps_because
 
-    @property
-    def is_search(self) -> bool:
-        """Whether configurations are found by minimising the pose error, without a Jacobian inverse."""
-        return not self.feeds_back
-
 
 BY_FEEDBACK: Final = "follows the path only as far as the feedback of its errors takes it"
 AT_SAMPLES: Final = "is defined at the samples alone"

@@ -33,4 +33,4 @@ def test_a_method_that_feeds_errors_back_uses_the_gain_and_a_search_does_not(nam
     text = (FOLDER / f"{name}.py").read_text(encoding="utf-8")
 
     assert SolverEntry(integrator="euler", method=name, gain_per_s=1.0).traits is METHODS[name]
-    assert ("configuration_search" in text or "search_cost" in text) == METHODS[name].is_search
+    assert ("configuration_search" in text or "search_cost" in text) != METHODS[name].feeds_back

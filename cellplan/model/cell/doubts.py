@@ -21,11 +21,6 @@ def doubt_about(cell: Cell, robot: Robot) -> str:
     return _about_tool(robot) or doubt_about_limits(robot) or _about_base(cell, robot)
 
 
-def doubt_about_all(cell: Cell) -> str:
-    """The first question about any robot of a cell."""
-    return next((text for robot in cell.robots if (text := doubt_about(cell, robot))), "")
-
-
 def doubt_about_velocity(limit: float, others: Sequence[float], *, is_revolute: bool) -> str:
     """A question about the velocity limit of a joint that is far below those of the robot's other joints like it."""
     unit, factor = ("radians", NARROW) if is_revolute else ("metres", THOUSAND)

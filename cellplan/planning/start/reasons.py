@@ -10,7 +10,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.transforms import inverse
 from cellplan.model.cell.cell import Cell, Grasp, Relation, Robot
-from cellplan.model.cell.doubts import doubt_about, doubt_about_all
+from cellplan.model.cell.doubts import doubt_about
 from cellplan.model.robot.robot import Joint
 from cellplan.model.seeds import generator
 from cellplan.planning.start.branches import SEEDS, SEEDS_PER_HOLDER, StartSearch
@@ -199,7 +199,8 @@ def _cure(contact: StartContact) -> str:
 def _frequent_words(search: StartSearch) -> str:
     """What to say where every contact can be avoided, but not all of them together."""
     tried = search.failures.touching
-    counted, doubt = contacts_between(search.trials, tried)[:SHOWN], doubt_about_all(search.cell)
+    counted = contacts_between(search.trials, tried)[:SHOWN]
+    doubt = next((text for robot in search.cell.robots if (text := doubt_about(search.cell, robot))), "")
     named = ", ".join(f"'{first}' touches '{second}' in {count}" for (first, second), count in counted)
     return (
         f"{search.cell.origin.at('robots')}: found no start configurations that reach the tasks without contact: of "

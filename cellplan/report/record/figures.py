@@ -165,7 +165,7 @@ def figures_of(reports: Iterable[Report], *, cycle: float | None = None, load: f
     Args:
         cycle: Time from the first row of the program to the last one in [s], where that is asked for.
     """
-    figures = Figures({phase_of(report): _figures_of_phase(report) for report in reports})
+    figures = Figures({report.phase or ALL_TASKS: _figures_of_phase(report) for report in reports})
     of_program: dict[str, dict[str, float]] = {} if load is None else {"load_ratio": {ALL: load}}
     if cycle is not None:
         of_program |= {"cycle_time_s": {ALL: cycle}, "parts_per_h": {ALL: SECONDS_PER_HOUR / cycle}}
@@ -183,11 +183,6 @@ def figures_record(reports: Iterable[Report]) -> FiguresRecord:
         }
         for phase, quantities in figures_of(reports).by_phase.items()
     }
-
-
-def phase_of(report: Report) -> str:
-    """Name of the phase of a report."""
-    return report.phase or ALL_TASKS
 
 
 def _figures_of_phase(report: Report) -> dict[str, dict[str, float]]:

@@ -6,7 +6,6 @@ from typing import Annotated, Any, Final, TypedDict
 from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.cell.idle import not_in_program
 from cellplan.model.motion.plan import Phase
-from cellplan.model.report.report import Report
 from cellplan.report.record.common import Number, Record, number
 
 AT: Final = "at_s"  # ends the key of an instant, which counts from the begin of its phase
@@ -93,11 +92,6 @@ class IdleRecord(TypedDict):
 
     idle: list[str]
     not_in_program: list[str]
-
-
-def idle_record(cell: Cell, report: Report) -> IdleRecord:
-    """Idle robots of one run, and moves that its program does not contain."""
-    return {"idle": list(report.idle), "not_in_program": missing_moves(cell, {None: report.tasks})}
 
 
 def missing_moves(cell: Cell, runs: Mapping[str | None, Iterable[str]]) -> list[str]:

@@ -15,7 +15,7 @@ from cellplan.report.record.common import (
     origin_record,
 )
 from cellplan.report.record.figures import FiguresRecord, figures_record
-from cellplan.report.record.phases import PhaseRecord, clock_from, idle_record, phases_record
+from cellplan.report.record.phases import PhaseRecord, clock_from, missing_moves, phases_record
 from cellplan.report.record.sections.accelerations import AccelerationsRecord, accelerations_record
 from cellplan.report.record.sections.clearance import (
     ClosestPair,
@@ -28,7 +28,6 @@ from cellplan.report.record.sections.clearance import (
     clearance_record,
     closest_pairs_record,
     contacts_record,
-    exclusions_record,
     left_out_record,
 )
 from cellplan.report.record.sections.joints import (
@@ -161,12 +160,15 @@ def run_record(phase: ReportedPhase, *, provenance: Provenance, planning: Planni
         "required_clearance_mm": number(cell.checks.clearance_mm),
         "pair_count": report.clearance.pair_count,
         "contacts": contacts_record(report.clearance),
-        "exclusions": exclusions_record(report.clearance),
+        "exclusions": [
+            {"pair": [first, second], "reason": reason} for first, second, reason in report.clearance.exclusions
+        ],
         "singularity": singularity_record(report.conditioning, report.times),
         "motion_share": motion_share_record(report, cell),
         "speeds": {robot: speed_record(speed) for robot, speed in report.speeds.items()},
         "checks": [check_record(check) for check in report.checks],
-        **idle_record(cell, report),
+        "idle": list(report.idle),
+        "not_in_program": missing_moves(cell, {None: report.tasks}),
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "rests_on": rests_on_record(cell, report.loads, report.standoffs),

@@ -56,7 +56,7 @@ def _integration_lines(record: Record, step: str) -> Iterator[str]:
     feedback = f"pose errors are fed back with a gain of {record['gain_per_s']:g} per second"
     if record["integrator"] != Integrator.ACCURATE:
         steps = f", Euler steps of {step}" if traits.takes_euler_steps else ""
-        yield f"Method: {name}{steps}." if traits.is_search else f"Method: {name}{steps}; {feedback}."
+        yield f"Method: {name}{steps}." if not traits.feeds_back else f"Method: {name}{steps}; {feedback}."
         if not traits.is_accurate:
             yield no_accurate_mode(record["method"])
         return

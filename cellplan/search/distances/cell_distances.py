@@ -27,7 +27,6 @@ from cellplan.search.distances.keep_out import keep_out_bodies
 from cellplan.search.distances.layout_pairs import (
     LayoutPair,
     among,
-    are_within_robot,
     demands_of,
     layout_pairs,
     with_areas,
@@ -76,7 +75,8 @@ class CellDistances:
             is_hull=np.append(scene.near_table.is_hull, [True] * len(added)).astype(bool),
         )
         self.demands = demands_of(self.pairs)  # what is demanded of each pair in [m], shape (P,)
-        self.within_robot = are_within_robot(self.pairs)  # whether both of its bodies belong to one robot, shape (P,)
+        # whether both of its bodies belong to one robot, shape (P,)
+        self.within_robot = np.array([pair.within_robot for pair in self.pairs], dtype=bool)
         self.most_demanded = float(self.demands.max(initial=0.0))  # the largest demand in [m]
         index = {robot.name: place for place, robot in enumerate(self._cell.robots)}
         self._robots = np.array(

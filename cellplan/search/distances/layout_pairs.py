@@ -83,11 +83,6 @@ def demands_of(pairs: Sequence[LayoutPair]) -> Array:
     return np.array([pair.demand for pair in pairs])
 
 
-def are_within_robot(pairs: Sequence[LayoutPair]) -> Flags:
-    """Which pairs belong to one robot, shape (P,)."""
-    return np.array([pair.within_robot for pair in pairs], dtype=bool)
-
-
 def among(pairs: WatchedPairs, is_selected: Flags) -> WatchedPairs:
     """Some of the pairs, by what they are called: ``is_selected`` has an entry for each row."""
     count = len(pairs.solids)

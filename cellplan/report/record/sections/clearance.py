@@ -132,11 +132,6 @@ def contacts_record(clearance: ClearanceReport) -> list[Contact]:
     ]
 
 
-def exclusions_record(clearance: ClearanceReport) -> list[ExclusionRecord]:
-    """Pairs with reduced requirements, and the reasons."""
-    return [{"pair": [first, second], "reason": reason} for first, second, reason in clearance.exclusions]
-
-
 def closest_pairs_record(clearance: ClearanceReport) -> list[ClosestPair]:
     """The closest pairs that must keep the required clearance, nearest first."""
     return [
