@@ -33,16 +33,12 @@ class InputError(CellplanError):
 
 
 class InvalidFileError(InputError):
-    """All findings about one file at once, one line each.
-
-    Attributes:
-        findings: The single errors, in the order of the file.
-    """
+    """All findings about one file at once, one line each."""
 
     def __init__(self, findings: list[InputError]) -> None:
         """Join the findings, one per line."""
         super().__init__("\n".join(str(finding) for finding in findings))
-        self.findings = findings
+        self.findings = findings  # the single errors, in the order of the file
 
     def __reduce__(self) -> tuple[type["InvalidFileError"], tuple[list[InputError]]]:
         """Cross to another process with every finding."""

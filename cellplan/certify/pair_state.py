@@ -77,19 +77,13 @@ class PairState:
 
 
 class StepBounds:
-    """Lower bounds of the distance of a pair in each step.
-
-    Attributes:
-        low: No distance in the step is below this, in [m], shape (n - 1,); zero where the bodies touch.
-        is_closed: Steps in which the bodies touch, shape (n - 1,).
-        is_given_up: Steps of which no more can be proved, shape (n - 1,).
-    """
+    """Lower bounds of the distance of a pair in each step."""
 
     def __init__(self, low: Array) -> None:
         """Start from the first bounds."""
-        self.low = low
-        self.is_closed: Flags = np.zeros(len(low), dtype=bool)
-        self.is_given_up: Flags = np.zeros(len(low), dtype=bool)
+        self.low = low  # no distance in the step is below this, in [m], shape (n - 1,); zero where the bodies touch
+        self.is_closed: Flags = np.zeros(len(low), dtype=bool)  # steps in which the bodies touch, shape (n - 1,)
+        self.is_given_up: Flags = np.zeros(len(low), dtype=bool)  # steps of which no more can be proved, shape (n - 1,)
 
     def lowest(self) -> tuple[int, float]:
         """The open step with the lowest bound, and that bound in [m]; inf when no step is open."""

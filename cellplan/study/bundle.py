@@ -118,11 +118,7 @@ class _Pickler(pickle.Pickler):
 
 
 class Unpacked(pickle.Unpickler):
-    """A value that was packed with its paths.
-
-    Attributes:
-        value: The value, with the paths that hold in this process.
-    """
+    """A value that was packed with its paths."""
 
     def __init__(self, payload: bytes, root: str) -> None:
         """Unpack it.
@@ -132,7 +128,7 @@ class Unpacked(pickle.Unpickler):
         """
         super().__init__(io.BytesIO(payload))
         self._root, self._written = root, dict[str, str]()
-        self.value: Any = self.load()
+        self.value: Any = self.load()  # the value, with the paths that hold in this process
 
     def persistent_load(self, pid: tuple[str, str]) -> Path:
         """The path here."""

@@ -26,12 +26,7 @@ from cellplan.scene.scene import Scene
 
 
 class FreeMotion:
-    """The programs of all robots, each with rows of its own.
-
-    Attributes:
-        scene: The scene.
-        last: Last row of each robot, by name.
-    """
+    """The programs of all robots, each with rows of its own."""
 
     def __init__(self, scene: Scene, q: Array | Mapping[str, Array]) -> None:
         """Work out the ways of all bodies, from at least two rows of each robot.
@@ -39,9 +34,9 @@ class FreeMotion:
         Positions are in [rad] or [m] of each robot, shape (N, n), not necessarily as many rows for each; or of all
         robots, stacked, shape (N, nq).
         """
-        self.scene = scene
+        self.scene = scene  # the scene
         self._q = _by_robot(scene.cell, q)
-        self.last = {name: len(rows) - 1 for name, rows in self._q.items()}
+        self.last = {name: len(rows) - 1 for name, rows in self._q.items()}  # last row of each robot, by name
         bodies = range(len(scene.engine.bodies))
         carriers = [scene.carrier(index) for index in bodies]
         names = [robot.name for robot in scene.cell.robots]
