@@ -20,8 +20,7 @@ import pinocchio as pin
 import trimesh
 from sections import table
 
-from cellplan.files.robots.bundled import bundled_names, load_bundled
-from cellplan.files.robots.joint_table import read_robot_table
+from cellplan.files.robots.joint_table import bundled_names, load_bundled, read_robot_table
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_about, transform_points

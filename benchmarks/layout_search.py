@@ -35,7 +35,7 @@ from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.measures import Measures
 from cellplan.search.programs.objective import Demands, Effort, Objective
-from cellplan.search.programs.perturb import perturbed
+from cellplan.search.programs.problem import perturbed
 from cellplan.search.variables.variables import Variables
 
 CELL: Final = Path(__file__).resolve().parent.parent / "cells" / "four_robots_initial.yaml"

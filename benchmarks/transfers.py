@@ -17,7 +17,7 @@ import numpy as np
 from coal_shapes import coal_shape
 
 from cellplan.errors import TransferNotFoundError
-from cellplan.files.robots.bundled import load_bundled
+from cellplan.files.robots.joint_table import load_bundled
 from cellplan.files.robots.urdf.load import load_urdf
 from cellplan.geometry.shapes import Box, Cylinder, HalfSpace, Solid, Sphere, bounding_sphere
 from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp

@@ -11,7 +11,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-from cellplan.files.robots.bundled import load_bundled
+from cellplan.files.robots.joint_table import load_bundled
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.transforms import Array, transform_points
 from cellplan.model.cell.cell import Robot, Tool

@@ -6,7 +6,7 @@ from typing import Final
 
 from cellplan.checks.clearance.phase_ends import JudgedPhase
 from cellplan.geometry.arrays import Array
-from cellplan.measures.near_paths import resting_pairs
+from cellplan.measures.weld_position import resting_pairs
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.report import Check, Report
 from cellplan.model.settings.program import groups_of

@@ -8,8 +8,7 @@ from cellplan.model.motion.branches import MovedStart
 from cellplan.model.motion.motion import Motion, Program, Schedule
 from cellplan.model.motion.plan import Phase, Plan
 from cellplan.model.presented import Presented
-from cellplan.model.report.report import Report
-from cellplan.model.report.verdict import verdict
+from cellplan.model.report.report import Report, verdict
 from cellplan.scene.scene import Scene
 
 

@@ -21,7 +21,6 @@ from cellplan.scene.collision.engine import Engine
 from cellplan.scene.collision.overlap.containment import is_inside
 from cellplan.scene.collision.separation import heights
 from cellplan.scene.kinematics.screw_chain import Chains
-from cellplan.scene.link_tree import LinkTree
 from cellplan.scene.mounting import (
     MOUNT_DEPTH,
     Mount,
@@ -31,7 +30,7 @@ from cellplan.scene.mounting import (
     keeps_out_of_grip,
     refuse_wrong_mounting,
 )
-from cellplan.scene.pairs import Excluded, Rule, ScenePair, near_in_chain, stands_on
+from cellplan.scene.pairs import Excluded, LinkTree, Rule, ScenePair, near_in_chain, stands_on
 
 CONFIGURATION_COUNT: Final = 48  # random ones beside the reference; a pair free in one of ten escapes 0.6 % of trials
 CONSTANT_DISTANCE_TOL: Final = 1e-3  # [m] a distance that varies by less is a matter of mounting, not of motion

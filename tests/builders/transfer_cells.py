@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from builders.scene_builders import body, joint, make_cell, placed, stick
-from cellplan.files.robots.bundled import load_bundled
+from cellplan.files.robots.joint_table import load_bundled
 from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Obstacle, Robot

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cellplan.geometry.arrays import Array
-from cellplan.measures.near_paths import distances, resting_pairs
+from cellplan.measures.weld_position import distances, resting_pairs
 
 
 def line(begin: tuple[float, float], end: tuple[float, float], count: int = 30) -> Array:

@@ -9,7 +9,7 @@ from builders.records import phase_record
 from cellplan.jobs.compare.result import ROWS
 from cellplan.jobs.view.run_scene import _facts
 from cellplan.model.cell.cell import Mode
-from cellplan.model.report.verdict import verdict
+from cellplan.model.report.report import verdict
 from cellplan.report.page.figures import key_figures, phase_errors
 from cellplan.report.page.render import MODES, report_page
 from cellplan.report.record.figures import SHOWN, page_cells, terminal_table

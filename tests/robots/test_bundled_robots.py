@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from cellplan.files.robots.bundled import load_bundled
+from cellplan.files.robots.joint_table import load_bundled
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array, inverse, rotation_from_rpy, transform_points

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cellplan.files.robots.bundled import bundled_names, load_bundled
+from cellplan.files.robots.joint_table import bundled_names, load_bundled
 from cellplan.files.robots.urdf.load import UrdfOptions, load_urdf
 from cellplan.geometry.shapes import support
 from cellplan.geometry.transforms import Array

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cellplan.errors import InputError
-from cellplan.files.robots.bundled import load_bundled
+from cellplan.files.robots.joint_table import load_bundled
 from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Robot

@@ -69,7 +69,7 @@ def robots(options: RobotsOptions) -> None:
 
 def _listed() -> list[dict[str, Any]]:
     """All bundled robots."""
-    from cellplan.files.robots.bundled import bundled_names, load_bundled
+    from cellplan.files.robots.joint_table import bundled_names, load_bundled
 
     return [_record(name, load_bundled(name)) for name in bundled_names()]
 

@@ -33,7 +33,7 @@ def schema(options: SchemaOptions) -> None:
 
         say_json(report_schema() if options.report else series_schema() if options.series else layout_schema())
     else:
-        from cellplan.files.robots.bundled import bundled_names
+        from cellplan.files.robots.joint_table import bundled_names
         from cellplan.files.schema import json_schema
 
         say_json(json_schema(bundled_names()))

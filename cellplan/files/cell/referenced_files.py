@@ -13,8 +13,7 @@ from cellplan.files.cell.toolpath_csv import read_toolpath_csv
 from cellplan.files.input.files import AllowedFolders, digest_of_file
 from cellplan.files.input.findings import Finding, KeyPath, key_text, shown
 from cellplan.files.robots.build_controller import with_zero_of_file
-from cellplan.files.robots.bundled import load_bundled_table
-from cellplan.files.robots.joint_table import RobotTable, load_robot_table
+from cellplan.files.robots.joint_table import RobotTable, load_bundled_table, load_robot_table
 from cellplan.files.robots.rules import limits_in_si, tightened
 from cellplan.files.robots.urdf import XACRO_SUFFIX
 from cellplan.files.schema.path import CsvEntry

@@ -9,8 +9,7 @@ from cellplan.cache import as_here
 from cellplan.errors import InputError
 from cellplan.files.cell.referenced_files import TABLE_SUFFIXES, URDF_SUFFIXES
 from cellplan.files.input.files import AllowedFolders
-from cellplan.files.robots.bundled import load_bundled
-from cellplan.files.robots.joint_table import load_robot_table
+from cellplan.files.robots.joint_table import load_bundled, load_robot_table
 from cellplan.files.robots.urdf.describe import cell_lines, describe_urdf, size_along
 from cellplan.files.robots.urdf.load import UrdfOptions
 from cellplan.guard import Guard, in_child

@@ -1,4 +1,4 @@
-"""How the controller of a robot counts its joints: entries of a robot file become the model's data."""
+"""How a robot's controller counts its joints, and what the robot carries: entries of its file as the model has them."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -16,6 +16,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.robot.controller import ControllerZero
 from cellplan.model.robot.robot import Joint, RobotModel
 from cellplan.model.settings.controllers import ControllerZeroEntry
+from cellplan.model.settings.robot import PayloadEntry
 from cellplan.model.settings.units import si_or_none
 
 PARALLEL: Final = 0.999  # [-] cosine of two axes that count as parallel: 2.6 deg
@@ -123,3 +124,14 @@ def _names(
     for joint in given:
         if joint not in known:
             yield document.key_finding((*path, joint), unknown_name(what, joint, known))
+
+
+def payload_findings(
+    path: KeyPath, entry: PayloadEntry | None, turning: tuple[str, ...], document: YamlDocument
+) -> Iterator[Finding]:
+    """Limits of axes belong to the last turning joints before the flange, named from the base on."""
+    last = turning[-3:]
+    for joint in entry.axes if entry is not None else ():
+        if joint not in last:
+            text = unknown_name("one of the last turning joints", joint, last)
+            yield document.key_finding((*path, "axes", joint), text)

@@ -1,9 +1,9 @@
-"""Robot from a joint-axis table: axes, limits, flange and link bodies at the reference configuration."""
+"""Robots from joint-axis tables, bundled ones: axes, limits, flange and link bodies at the reference configuration."""
 
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,9 +12,13 @@ import numpy as np
 from cellplan.cache import as_here
 from cellplan.errors import InputError
 from cellplan.files.input.files import AllowedFolders
-from cellplan.files.input.findings import Finding, KeyPath, raise_findings, shown, unknown_name
-from cellplan.files.robots.build_controller import build_controller, controller_findings, sense_findings
-from cellplan.files.robots.build_payload import payload_findings
+from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, raise_findings, shown, unknown_name
+from cellplan.files.robots.build_controller import (
+    build_controller,
+    controller_findings,
+    payload_findings,
+    sense_findings,
+)
 from cellplan.files.robots.limits import RATES
 from cellplan.files.schema import RobotTableDocument
 from cellplan.files.schema.messages import validate
@@ -29,6 +33,7 @@ from cellplan.model.robot.robot import BASE, Body, Joint, JointKind, Link, Robot
 from cellplan.model.settings.robot import BodyAccuracyEntry
 from cellplan.model.settings.units import in_si, si_or_none
 
+FOLDER: Final = Path(__file__).resolve().parents[2] / "robots"
 FOOT: Final = "base"  # word for the link that does not move
 TOOL_NAME: Final = re.compile(r"tool(_[0-9]+)?")  # these names belong to the bodies of the tool
 
@@ -176,3 +181,26 @@ def _joint(name: str, entry: JointEntry, parent: int) -> Joint:
     return Joint(
         name=name, kind=kind, parent=parent, axis_B=axis / np.linalg.norm(axis), point_B=in_si(entry.point_mm), **limits
     )
+
+
+def bundled_names() -> tuple[str, ...]:
+    """Names of all bundled robots, in alphabetical order."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
+
+
+def load_bundled(name: str) -> RobotModel:
+    """A bundled robot; ``InputError`` where there is none of that name."""
+    return load_bundled_table(name).model
+
+
+@lru_cache(maxsize=16)
+def load_bundled_table(name: str) -> RobotTable:
+    """A bundled robot with the digest of its table; read once in each process."""
+    names = bundled_names()
+    if name not in names:
+        hint = did_you_mean(name, names)
+        raise InputError(
+            "expected a bundled robot (`cellplan robots` lists them) or a .urdf, .xacro or .yaml file, got "
+            f"{shown(name)}{hint}"
+        )
+    return load_robot_table(FOLDER / f"{name}.yaml", file=f"bundled:{name}", folders=AllowedFolders(folder=FOLDER))

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, listed, unknown_name
-from cellplan.files.robots.build_payload import payload_findings
+from cellplan.files.robots.build_controller import payload_findings
 from cellplan.files.robots.limits import RATES, StatedLimits, limit_findings, limits_of, rates_of, tightest
 from cellplan.files.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
 from cellplan.files.yaml.reader import YamlDocument

@@ -12,8 +12,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.files.run.gap_lines import line_of_row, with_gap_lines, without_gap_lines
-from cellplan.files.run.joint_tables import MM_PER_M, plain_decimals
+from cellplan.files.run.joint_tables import MM_PER_M, line_of_row, plain_decimals, with_gap_lines, without_gap_lines
 from cellplan.geometry.transforms import Array
 from cellplan.model.motion.motion import ClockTable
 

@@ -8,19 +8,21 @@ back to itself; what is verified is what was read back.
 
 import hashlib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
+from typing import Final
 
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.files.run.gap_lines import line_of_row, with_gap_lines, without_gap_lines
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.motion.motion import JointTable
+from cellplan.model.motion.plan import NOT_IN_PROGRAM
 from cellplan.model.report.report import CAUTION
 
+_GAP: Final = re.compile(rf"# {NOT_IN_PROGRAM}: ([A-Za-z0-9_-]+ to [A-Za-z0-9_-]+)")
 TITLE = "cellplan joint table v1"
 NOT_CHECKED = "not checked"
 
@@ -269,3 +271,36 @@ def _check_clock(times: Array, places: _Places) -> None:
             f"{places.of(row)}: time_s: expected evenly spaced, growing times "
             f"({even[row]:.6g} here), got {times[row]:.6g}"
         )
+
+
+def with_gap_lines(rows: Iterator[str], gaps: Mapping[int, str]) -> Iterator[str]:
+    """Rows of a table with a line at each gap, named by the first row after it, counted from 0."""
+    for index, row in enumerate(rows):
+        if index in gaps:
+            yield f"# {NOT_IN_PROGRAM}: {gaps[index]}"
+        yield row
+
+
+def without_gap_lines(lines: Sequence[str], *, source: str, first_line: int) -> tuple[list[str], dict[int, str]]:
+    """Rows of a table, and its gaps by the first row after each.
+
+    The first of them is so many lines, from 1, into the source; an ``InputError`` has the line of another comment.
+    """
+    rows: list[str] = []
+    gaps: dict[int, str] = {}
+    for number, line in enumerate(lines, start=first_line):
+        if not line.startswith("#"):
+            rows.append(line)
+            continue
+        match = _GAP.fullmatch(line)
+        if match is None:
+            raise InputError(f"{source}:{number}: expected a row, or '# {NOT_IN_PROGRAM}: A to B', got {line[:60]!r}")
+        if not rows or len(rows) in gaps or number == first_line + len(lines) - 1:
+            raise InputError(f"{source}:{number}: expected '# {NOT_IN_PROGRAM}' between two rows only")
+        gaps[len(rows)] = match[1]
+    return rows, gaps
+
+
+def line_of_row(row: int, gaps: Mapping[int, str], *, first_line: int) -> int:
+    """Line of a row, counted from 0, in its file, from 1."""
+    return first_line + row + sum(after <= row for after in gaps)

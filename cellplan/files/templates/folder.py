@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.files.robots.bundled import bundled_names
+from cellplan.files.robots.joint_table import bundled_names
 from cellplan.files.run.drafts import hidden_folders
 from cellplan.files.schema import json_schema, robot_table_schema
 from cellplan.files.templates.catalogue import Template

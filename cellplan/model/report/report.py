@@ -1,8 +1,9 @@
 """Report: every verified statement with its margin, where and when it is worst, and the series behind the plots."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.acceleration import UNKNOWN_ACCELERATIONS, MotionAccelerations
@@ -14,10 +15,9 @@ from cellplan.model.report.check_kinds import CHECK_KINDS, CheckKind
 from cellplan.model.report.left_out import LeftOut
 from cellplan.model.report.skew import SkewReport
 from cellplan.model.report.stops import StopReport
-from cellplan.model.report.verdict import verdict
 from cellplan.model.robot.payload import LoadUse
 from cellplan.model.robot.repeatability import Repeatability
-from cellplan.model.units import DisplayUnit, joint_unit
+from cellplan.model.units import MM, DisplayUnit, joint_unit, rounded_down
 
 CAUTION = (
     "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
@@ -327,3 +327,25 @@ class Report(Presented):
     def __repr__(self) -> str:
         """One line without arrays."""
         return f"<Report of '{self.cell}', {self.phase or self.mode}, {self.cycle_time:g} s, {verdict([self])}>"
+
+
+if TYPE_CHECKING:
+    from cellplan.model.report.report import Report
+
+
+def verdict(reports: Sequence["Report"]) -> str:
+    """Checks that passed and the smallest clearance, or checks that failed and the first of them."""
+    checks = [check for report in reports for check in report.checks]
+    failed = [check.message for check in checks if not check.passed]
+    if failed:
+        return f"failed: {len(failed)} of {len(checks)} checks; {failed[0]}"
+    distances = (minimum for report in reports for minimum in report.clearance.minima.values())
+    known = [
+        (distance.minimum, distance.pair)
+        for distance in distances
+        if distance.minimum is not None and distance.pair is not None
+    ]
+    if not known:
+        return f"passed: {len(checks)} checks"
+    least, pair = min(known)
+    return f"passed: {len(checks)} checks; smallest clearance {rounded_down(MM * least):.1f} mm, {' - '.join(pair)}"

@@ -8,8 +8,7 @@ from typing import Final
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import JointTable, Motion, Schedule
 from cellplan.model.presented import Presented
-from cellplan.model.report.report import Report
-from cellplan.model.report.verdict import verdict
+from cellplan.model.report.report import Report, verdict
 
 ACCESS_TOKEN: Final = object()  # known to ``open_gate`` only
 

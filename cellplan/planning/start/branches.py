@@ -1,7 +1,7 @@
 """Start branches: the configurations of each robot from which a start of the whole cell can be put together."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -10,7 +10,6 @@ from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.cell.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.task.clocked_path import ClockedPath
 from cellplan.model.task.task import Frame, Task
-from cellplan.planning.start.failures import Failures, MissedGoal
 from cellplan.planning.start.given import is_off, part_pose, tool_distance
 from cellplan.planning.start.inverse_kinematics import (
     constrained_rank,
@@ -26,6 +25,8 @@ from cellplan.planning.start.seeds import seeded
 from cellplan.planning.start.trial_motion import StartTrials
 from cellplan.scene.kinematics.screw_chain import Chains
 
+MOST_CANDIDATES: Final = 24  # configurations of a robot, or of the cell, that are considered again
+MOST_GOALS: Final = 6  # goals of a robot that are considered again
 SEEDS: Final = 48  # random starts of the inverse kinematics per robot and place; finds all 8 branches of a 6-axis arm
 SEEDS_PER_HOLDER: Final = 16  # the same when many configurations of the positioner are to be tried
 HOLDER_DRAWS: Final = 1500  # configurations of the positioner that are drawn when its start is to be found as well
@@ -37,6 +38,53 @@ ALL_AXES: Final = 6  # [-] components of a grasp that leaves nothing free
 COMFORTABLE: Final = 0.1  # smallest singular value above which more manipulability is worth no more
 
 Branch = tuple[float, Array]  # what a configuration is worth, and the configuration, shape (n,)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MissedGoal:
+    """Where a tool was desired: a task or grasp, the desired tip, and the frame that it is given in, in the world."""
+
+    relation: Relation
+    X_PT: Array
+    X_WP: Array
+
+
+@dataclass(slots=True, kw_only=True)
+class Failures:
+    """What the search has seen of each robot, by name."""
+
+    # configurations within the limits that reach a goal, each with that of the positioner
+    arrived: dict[str, list[tuple[Array, Array | None]]] = field(default_factory=dict)
+    missed: dict[str, list[MissedGoal]] = field(default_factory=dict)  # goals that no configuration reaches
+    misses: dict[str, int] = field(default_factory=dict)  # how many such goals there were
+    beyond: dict[str, list[Array]] = field(default_factory=dict)  # reaching a goal with a joint out of its limits
+    # smallest distance in [m] and [rad] of a given start from its task or grasp, as the part was held
+    off: dict[str, tuple[float, float]] = field(default_factory=dict)
+    touching: list[Array] = field(default_factory=list)  # configurations of the whole cell in which something touches
+
+    def reached(self, robot: str, q: Array, holder_configuration: Array | None) -> None:
+        """Keep configurations of a robot, shape (K, n), that reach its goal with the positioner at one of its own."""
+        arrived = self.arrived.setdefault(robot, [])
+        arrived += [(configuration, holder_configuration) for configuration in q[: MOST_CANDIDATES - len(arrived)]]
+
+    def unreached(self, robot: str, goal: MissedGoal, *, beyond: Array) -> None:
+        """Keep a goal that a robot does not reach, and configurations that do outside its limits, shape (K, n)."""
+        self.misses[robot] = self.misses.get(robot, 0) + 1
+        goals = self.missed.setdefault(robot, [])
+        if len(goals) < MOST_GOALS:
+            goals.append(goal)
+        outside = self.beyond.setdefault(robot, [])
+        outside += list(beyond[: MOST_CANDIDATES - len(outside)])
+
+    def off_path(self, robot: str, distance: tuple[float, float]) -> None:
+        """Keep the distance of a given start from its task if it is the smallest so far."""
+        self.misses[robot] = self.misses.get(robot, 0) + 1
+        self.off[robot] = min(distance, self.off.get(robot, (np.inf, np.inf)))
+
+    def touched(self, q: Array) -> None:
+        """Keep a configuration of the whole cell, shape (nq,), in which something touches."""
+        if len(self.touching) < MOST_CANDIDATES:
+            self.touching.append(q)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

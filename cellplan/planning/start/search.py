@@ -15,8 +15,7 @@ from cellplan.model.cell.name_order import NameOrder
 from cellplan.model.progress import Progress, silent
 from cellplan.model.seeds import generator
 from cellplan.model.task.clocked_path import ClockedPath
-from cellplan.planning.start.branches import Branch, StartSearch, branches_of, holder_configurations
-from cellplan.planning.start.failures import Failures
+from cellplan.planning.start.branches import Branch, Failures, StartSearch, branches_of, holder_configurations
 from cellplan.planning.start.near_ties import best_first, levels
 from cellplan.planning.start.reasons import why_nothing
 from cellplan.planning.start.trial_motion import StartTrial, StartTrials

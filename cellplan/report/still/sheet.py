@@ -12,9 +12,8 @@ from cellplan.geometry.shapes import bounding_box, support_point
 from cellplan.report.record.common import shortened
 from cellplan.report.still.camera import Camera, framed, view_axes
 from cellplan.report.still.detail import DetailWindow, detail, is_worth_it, mark
-from cellplan.report.still.painter import Painter
+from cellplan.report.still.painter import Painter, rules
 from cellplan.report.still.picture import ShownSolid, StillPicture
-from cellplan.report.still.shading import rules
 
 WIDTH, HEIGHT = 7200, 4600  # units of the sheet: tenths of a pixel, so that places are whole numbers
 MARGIN: Final = 220

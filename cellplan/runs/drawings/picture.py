@@ -18,8 +18,8 @@ from cellplan.report.floor_plan.sheet import floor_plan_svg
 from cellplan.report.plots.palette import robot_colours
 from cellplan.report.record.numbers import floored
 from cellplan.report.still.facets import facets
+from cellplan.report.still.painter import mixed
 from cellplan.report.still.picture import Colour, ShownLine, ShownName, ShownSolid, StillPicture
-from cellplan.report.still.shading import mixed
 from cellplan.report.still.sheet import still_svg
 from cellplan.runs.drawings.floor_plan import floor_plan, schedule_paths, swept_state
 from cellplan.runs.drawings.instant import Instant, graver, heading, is_exact, worst_instant

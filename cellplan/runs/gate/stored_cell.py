@@ -11,7 +11,7 @@ from cellplan.files.cell.names import is_name
 from cellplan.files.cell.write import written_document
 from cellplan.files.input.files import digest_of_file
 from cellplan.files.input.findings import KeyPath, key_text, listed, shown
-from cellplan.files.robots.bundled import load_bundled_table
+from cellplan.files.robots.joint_table import load_bundled_table
 from cellplan.files.run.manifest import BUNDLED
 from cellplan.files.run.stored import CELL, StoredRun
 from cellplan.model.cell.cell import Cell

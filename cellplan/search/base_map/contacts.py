@@ -7,8 +7,7 @@ import numpy as np
 
 from cellplan.certify.depths import mounted_depths
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.scene.moved import stands_by_link
-from cellplan.scene.scene import Scene
+from cellplan.scene.scene import Scene, stands_by_link
 
 KEYS: Final = (3, 9, 33)  # [-] nodes at which distances are asked, more and more while nothing is too near
 AT_ONCE: Final = 128  # [-] configurations placed together: about 10 MB

@@ -17,11 +17,10 @@ from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.transforms import pose, rotation_about
 from cellplan.model.cell.cell import Cell
 from cellplan.model.cell.mounting import Bracket
-from cellplan.scene.body_table import BodyTable
 from cellplan.scene.collision.bodies import CollisionBody, prepare
 from cellplan.scene.collision.engine import Engine
 from cellplan.scene.kinematics.link_forest import WORLD
-from cellplan.scene.near import NearPairs, NearTable
+from cellplan.scene.near import BodyTable, NearPairs, NearTable
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.keep_out import keep_out_bodies
 from cellplan.search.distances.layout_pairs import (

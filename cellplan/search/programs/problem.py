@@ -1,12 +1,16 @@
 """Problem: what sequential programs know of what they improve; a whole layout, the path of a positioner, or both."""
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Final, Protocol
+
+import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.robot.robot import JointLimits
 from cellplan.search.kernel.varied import Varied, VariedFields
 from cellplan.search.programs.transfers import Transfers
+
+DRAWS: Final = 40  # [-] until one has a motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -121,3 +125,21 @@ class ProblemFields(VariedFields):
     limits: JointLimits = field(init=False)
     transfers: Transfers = field(init=False)
     is_dense: bool = field(init=False, default=False)
+
+
+def perturbed(
+    problem: Problem, x: Array, start: Array, rng: np.random.Generator, *, size: float = 1.0, draws: int = DRAWS
+) -> Point | None:
+    """A random point near a given one, drawn again until all tools can follow their paths; None where none can.
+
+    Args:
+        x: The variables, shape (n,).
+        start: Start posture near the right one in [rad] or [m], shape (nq,).
+        size: Standard deviation of each variable in its usual steps.
+    """
+    for _ in range(draws):
+        candidate = x + size * problem.scale * rng.normal(size=len(x))
+        point = problem.evaluate(np.clip(candidate, problem.lower, problem.upper), start)
+        if point is not None:
+            return point
+    return None

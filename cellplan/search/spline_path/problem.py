@@ -25,11 +25,14 @@ from cellplan.search.kernel.screws import Directions, TaskScrews
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
 from cellplan.search.programs.layout_problem import PairsAtNodes, distances_at
-from cellplan.search.programs.problem import Distances, Point, PointDerivatives, ProblemFields
+from cellplan.search.programs.problem import DRAWS, Distances, Point, PointDerivatives, ProblemFields
 from cellplan.search.programs.transfers import Transfers
 from cellplan.search.spline_path.nodes import PathNodes
 from cellplan.search.spline_path.variables import PathVariables
 
+WAVES: Final = 4  # cosines along the path, from the constant to one and a half periods
+SHARE: Final = 0.5  # of a usual step, of the constant; of each further wave less
+SMALLER: Final = 0.9  # factor of the next draw where a tool could not follow
 MOST_STEPS: Final = 12  # of Newton's method: four from a motion nearby
 CONVERGED: Final = 1e-10  # [rad] and [m]: a step below this changes nothing any more
 LONGEST: Final = 1.0  # [rad] or [m] of a step: beyond it another solution may be nearer
@@ -261,3 +264,29 @@ def _is_one_motion(times: Array, q: Array, qd: Array) -> bool:
     """Whether neighbouring nodes belong together: no joint leaves what its own speeds lead to."""
     step = np.diff(times)[:, None]
     return bool(np.abs(np.diff(q, axis=0) - 0.5 * step * (qd[1:] + qd[:-1])).max(initial=0.0) <= TORN)
+
+
+def perturbed_path(
+    problem: PathProblem, x: Array, start: Array, rng: np.random.Generator, *, size: float
+) -> Point | None:
+    """A random point near a given one, drawn again and smaller until all tools can follow their paths, or None.
+
+    Args:
+        x: The variables, shape (n,).
+        start: Start posture near the right one in [rad] or [m], shape (nq,).
+        size: Standard deviation in usual steps.
+    """
+    origin = problem.evaluate(x, start)
+    if origin is None:
+        return None
+    rows, columns = problem.path.given.coefficients.shape
+    order = np.arange(WAVES)
+    waves = np.cos(np.pi * np.linspace(0.0, 1.0, rows)[:, None] * order) * SHARE / (1.0 + order)
+    for _ in range(DRAWS):
+        path = (waves @ rng.normal(size=(WAVES, columns))).ravel()
+        step = np.concatenate([path, rng.normal(size=len(x) - len(path))])
+        point = problem.evaluate(np.clip(x + size * problem.scale * step, problem.lower, problem.upper), start, origin)
+        if point is not None:
+            return point
+        size *= SMALLER
+    return None

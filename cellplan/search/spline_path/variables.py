@@ -1,6 +1,6 @@
-"""Coefficients of a positioner's path as variables of a search."""
+"""Coefficients of a positioner's path as variables of a search, and the path that a search begins with."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -8,8 +8,13 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell.cell import Cell
 from cellplan.model.cell.joint_spline import JointSpline
+from cellplan.model.motion.motion import Schedule
 from cellplan.model.units import joint_unit
+from cellplan.search.kernel.job import Job, Layouts, enough_nodes
+from cellplan.search.kernel.run import run
 
+NODES: Final = 193  # of the motion that is fitted
+SAMPLES: Final = 401  # of a given path that gets another number of coefficients
 DECIMALS: Final = 6  # of a degree or a millimetre, as coefficients are written
 USUAL_ANGLE: Final = float(np.radians(10.0))  # [rad] of a step, and of a change that costs 1
 USUAL_LENGTH: Final = 0.1  # [m] likewise
@@ -70,3 +75,29 @@ class PathVariables:
             f"{joint.name}_{unit.name}" for joint, unit in zip(cell.robot(self.robot).model.joints, units, strict=True)
         ]
         return {"degree": self.given.degree, "coefficients": [dict(zip(keys, row, strict=True)) for row in values]}
+
+
+def first_path(
+    cell: Cell, schedule: Schedule, layout: Layouts, *, count: int, degree: int
+) -> tuple[JointSpline, Array] | None:
+    """The path nearest to the weighted pseudo-inverse motion, and the start posture (nq,); None if a tool is lost."""
+    carrier = next(robot for robot in cell.robots if robot.name == cell.positioners[0])
+    start = layout.start[0]
+    if carrier.path is not None:
+        return with_count(carrier.path, count, degree), start
+    free = replace(cell, robots=tuple(replace(robot, path=None) for robot in cell.robots))
+    job = Job.of(free, schedule, moving=[robot.name for robot in cell.robots], nodes=enough_nodes(schedule, NODES))
+    motion = run(job, layout)
+    if not motion.is_followed[0]:
+        return None
+    once = np.append(np.diff(job.times) > 0.0, True)
+    times, q = job.times[once], motion.q[0, once][:, cell.columns(carrier.name)]
+    return JointSpline.fitted(times / times[-1], q, count=count, degree=degree), motion.q[0, 0]
+
+
+def with_count(path: JointSpline, count: int, degree: int) -> JointSpline:
+    """A path with so many coefficients; the very path where it has them already."""
+    if (len(path.coefficients), path.degree) == (count, degree):
+        return path
+    shares = np.linspace(0.0, 1.0, SAMPLES)
+    return JointSpline.fitted(shares, path.at(shares), count=count, degree=degree)

@@ -10,7 +10,7 @@ import pytest
 
 from cellplan.cli.main import run
 from cellplan.cli.options import completion
-from cellplan.files.robots.bundled import bundled_names
+from cellplan.files.robots.joint_table import bundled_names
 from cellplan.model.cell.cell import Mode
 from cellplan.model.report.exported import Moves
 from cellplan.model.solver import METHODS, Integrator

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from cellplan.files.cell.load import load_cell
 from cellplan.files.cell.write import as_written, render_cell
-from cellplan.files.robots.bundled import load_bundled
+from cellplan.files.robots.joint_table import load_bundled
 from cellplan.files.yaml.reader import parse_yaml
 from cellplan.files.yaml.writer import yaml_text
 from cellplan.model.cell.cell import Cell, Mode

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from cellplan.errors import InputError
-from cellplan.files.robots.bundled import bundled_names, load_bundled
-from cellplan.files.robots.joint_table import read_robot_table
+from cellplan.files.robots.joint_table import bundled_names, load_bundled, read_robot_table
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere, support
 from cellplan.geometry.transforms import is_rigid, pose
 from cellplan.model.robot.robot import BASE, Body, JointKind, RobotModel

@@ -5,7 +5,7 @@ import pytest
 
 from cellplan.errors import InputError
 from cellplan.files.run.clock_table import parse_clock, render_clock
-from cellplan.files.run.gap_lines import line_of_row, with_gap_lines, without_gap_lines
+from cellplan.files.run.joint_tables import line_of_row, with_gap_lines, without_gap_lines
 from cellplan.model.motion.motion import ClockTable
 
 TABLE = ClockTable(

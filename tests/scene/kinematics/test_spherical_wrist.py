@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from builders.scene_builders import placed
 
-from cellplan.files.robots.bundled import load_bundled
+from cellplan.files.robots.joint_table import load_bundled
 from cellplan.model.robot.robot import RobotModel
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.kinematics.spherical_wrist import SphericalWristArm

@@ -13,11 +13,10 @@ from cellplan.jobs.layout.trials.prepared import PreparedSearch, values_of
 from cellplan.jobs.layout.trials.searched import searched_cell
 from cellplan.model.cell.cell import Cell
 from cellplan.model.settings.layout import MisplacementEntry
-from cellplan.search.misplacement.corners import judged
+from cellplan.search.misplacement.corners import judged, tolerances
 from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.misplacement.guarded import guarded
 from cellplan.search.misplacement.robust import RobustSearch, ScenarioProblem, robust_layout, seeded_signs, worst
-from cellplan.search.misplacement.tolerance import tolerances
 from cellplan.search.programs.measures import Measures
 from cellplan.search.programs.objective import Demands, Effort, Objective
 

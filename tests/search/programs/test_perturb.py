@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from builders.toy_problem import Toy
 
-from cellplan.search.programs.perturb import perturbed
+from cellplan.search.programs.problem import perturbed
 
 
 def test_draws_without_a_motion_are_drawn_again() -> None:

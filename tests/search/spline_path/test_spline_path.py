@@ -20,10 +20,9 @@ from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point
-from cellplan.search.spline_path.first import first_path
 from cellplan.search.spline_path.nodes import PathNodes
 from cellplan.search.spline_path.problem import PathProblem
-from cellplan.search.spline_path.variables import PathVariables
+from cellplan.search.spline_path.variables import PathVariables, first_path
 from cellplan.search.variables.variables import Variables
 
 FOUR = Path(__file__).resolve().parents[3] / "cells" / "four_robots.yaml"

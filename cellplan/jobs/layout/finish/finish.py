@@ -15,8 +15,16 @@ import numpy as np
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.fastest.timed_program import TimedProgram
-from cellplan.jobs.layout.finish.between_nodes import distances_missed_at, exceeded_at, margins_missed_at
-from cellplan.jobs.layout.finish.cycles import draft, is_scaled, load_of, shortest, time_of
+from cellplan.jobs.layout.finish.cycles import (
+    distances_missed_at,
+    draft,
+    exceeded_at,
+    is_scaled,
+    load_of,
+    margins_missed_at,
+    shortest,
+    time_of,
+)
 from cellplan.jobs.layout.misplacement_record import MisplacementRecord
 from cellplan.jobs.layout.trials.limits import Standing, standing_of
 from cellplan.jobs.layout.trials.prepared import NOT_FOLLOWED, PreparedSearch, demands_near, prepared, values_of

@@ -39,11 +39,10 @@ from cellplan.model.settings.layout import MisplacementEntry
 from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import number
 from cellplan.runs.early_clearance import EarlyClearance
-from cellplan.search.misplacement.corners import Corner
+from cellplan.search.misplacement.corners import BaseTolerance, Corner, tolerances
 from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.misplacement.guarded import guarded
 from cellplan.search.misplacement.robust import WITHIN, Robust, RobustSearch, robust_layout, seeded_signs
-from cellplan.search.misplacement.tolerance import BaseTolerance, tolerances
 from cellplan.search.programs.objective import CycleTiming, Demands, Effort, Objective
 from cellplan.study.study import Study
 from cellplan.study.trial import StudyTrial, Variant

@@ -12,10 +12,9 @@ from cellplan.model.cell.joint_spline import JointSpline
 from cellplan.model.cell.layout import PathRange, VariableKind
 from cellplan.model.motion.motion import Schedule
 from cellplan.search.distances.cell_distances import CellDistances
-from cellplan.search.spline_path.first import SAMPLES, first_path, with_count
 from cellplan.search.spline_path.nodes import PathNodes
 from cellplan.search.spline_path.problem import PathProblem
-from cellplan.search.spline_path.variables import PathVariables
+from cellplan.search.spline_path.variables import SAMPLES, PathVariables, first_path, with_count
 from cellplan.search.variables.variables import Variables
 from cellplan.search.variables.written import written_start
 

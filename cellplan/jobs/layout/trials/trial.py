@@ -18,9 +18,8 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.seeds import generator
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Demands, Effort
-from cellplan.search.programs.perturb import perturbed
-from cellplan.search.spline_path.perturb import perturbed_path
-from cellplan.search.spline_path.problem import PathProblem
+from cellplan.search.programs.problem import perturbed
+from cellplan.search.spline_path.problem import PathProblem, perturbed_path
 from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to

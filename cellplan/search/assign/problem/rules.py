@@ -8,7 +8,7 @@ from typing import Final, Self
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
-from cellplan.measures.near_paths import POINTS, resting_pairs
+from cellplan.measures.weld_position import POINTS, resting_pairs
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.report import Check
 from cellplan.model.settings.program import groups_of

@@ -5,7 +5,7 @@ import pytest
 from builders.jacobian_cells import model_of, planners_jacobian, with_operator
 from builders.random_cells import random_cell, random_model
 
-from cellplan.files.robots.bundled import bundled_names, load_bundled
+from cellplan.files.robots.joint_table import bundled_names, load_bundled
 from cellplan.geometry.transforms import inverse, pose, rotation_about, rotation_vector
 from cellplan.jobs.explain.derivations.denavit_hartenberg import dh_chain, dh_cooperation_jacobian, geometric_jacobian
 from cellplan.model.cell.cell import Robot, Tool

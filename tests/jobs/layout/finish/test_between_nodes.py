@@ -7,8 +7,7 @@ import pytest
 
 from cellplan import load_cell
 from cellplan.jobs.fastest.timed_program import Law, TimedProgram
-from cellplan.jobs.layout.finish.between_nodes import distances_missed_at, exceeded_at, margins_missed_at
-from cellplan.jobs.layout.finish.cycles import load_of, time_of
+from cellplan.jobs.layout.finish.cycles import distances_missed_at, exceeded_at, load_of, margins_missed_at, time_of
 from cellplan.model.progress import silent
 
 CELLS = Path(__file__).resolve().parents[4] / "cells"

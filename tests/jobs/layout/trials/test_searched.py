@@ -16,8 +16,7 @@ from cellplan.jobs.layout.trials.searched import freed, searched_cell
 from cellplan.jobs.layout.trials.trial import Begin, _Begin
 from cellplan.jobs.layout.variable_records import path_record
 from cellplan.model.seeds import generator
-from cellplan.search.spline_path.perturb import perturbed_path
-from cellplan.search.spline_path.problem import PathProblem
+from cellplan.search.spline_path.problem import PathProblem, perturbed_path
 
 CELLS = Path(__file__).resolve().parents[4] / "cells"
 FOUR = CELLS / "four_robots.yaml"

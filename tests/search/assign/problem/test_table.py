@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders.scene_builders import placed, stick
 
-from cellplan.files.robots.bundled import load_bundled
+from cellplan.files.robots.joint_table import load_bundled
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import pose
 from cellplan.search.assign.problem.table import LONGEST_MOVE, MARGIN, BranchFollower
