@@ -1,4 +1,4 @@
-"""Weld positions: how tools and welds lie to gravity along a path, by the angles of ISO 6947; and paths that warm one another.
+"""Welds: how tools and welds lie to gravity along a path, by the angles of ISO 6947; paths that warm one another.
 
 The slope is the angle of the weld axis, along the direction of travel, above the horizontal. The rotation is the angle
 by which the weld face is turned about that axis from where it looks up: 0 for a flat weld, 90 deg for one on a wall.

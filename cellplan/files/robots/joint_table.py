@@ -1,4 +1,4 @@
-"""Robots from joint-axis tables, bundled ones: axes, limits, flange and link bodies at the reference configuration."""
+"""Robots from joint-axis tables, also bundled ones: axes, limits, flange and bodies at the reference configuration."""
 
 import re
 from collections.abc import Iterator, Mapping
