@@ -4,14 +4,14 @@ The depth of a column is the length of it that lies inside the part or beyond, f
 whose back end lies inside already has entered where its line did so last.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.geometry.line_spans import line_spans
-from cellplan.geometry.shapes import Mesh, Solid, support_point
+from cellplan.geometry.line_spans import Spans, line_spans
+from cellplan.geometry.shapes import Box, Mesh, Solid, bounding_box, support_point
 
 GRAZE_TOL: Final = 1e-5  # [m] an axis free this far to the side, or a back end so near the far side, only touches
 SIDE_TOL: Final = 1e-4  # [m] what the side of a body reaches into a wall along it by less is touching, not depth
@@ -116,7 +116,7 @@ def _depths(columns: Columns, shape: Solid, X_ST: Array) -> Array:
     across = columns.points[columns.line]
     points = p[:, None, :] + across @ np.swapaxes(R[:, :, :2], 1, 2)
     directions = np.broadcast_to(R[:, None, :, 2], points.shape)
-    spans = line_spans(shape, points.reshape(-1, 3), directions.reshape(-1, 3))
+    spans = _spans_near(columns, shape, points.reshape(-1, 3), directions.reshape(-1, 3))
     pose, column = np.divmod(spans.line, max(count, 1))
     entered = (spans.leave > columns.back[column] + GRAZE_TOL) & (spans.enter < columns.front[column])
     depth = np.zeros(poses * lines)
@@ -126,6 +126,20 @@ def _depths(columns: Columns, shape: Solid, X_ST: Array) -> Array:
     at_guards = by_line[:, columns.guards].min(axis=2)
     counted = np.where(at_guards < HALF_FRACTION * by_line, at_guards, by_line)
     return counted.max(axis=1)
+
+
+def _spans_near(columns: Columns, shape: Solid, points: Array, directions: Array) -> Spans:
+    """Where the lines of columns run inside a part; of a mesh only columns that reach into the box round it count."""
+    if not isinstance(shape, Mesh):
+        return line_spans(shape, points, directions)
+    middle, half = bounding_box(shape)
+    x, y, z = (2.0 * (half + EDGE_TOL)).tolist()
+    in_box = line_spans(Box((x, y, z)), points - middle, directions)
+    column = in_box.line % len(columns.line)
+    reaches = (in_box.leave >= columns.back[column]) & (in_box.enter <= columns.front[column])
+    near = in_box.line[reaches]
+    spans = line_spans(shape, points[near], directions[near])
+    return replace(spans, line=near[spans.line])
 
 
 def _directions() -> Array:

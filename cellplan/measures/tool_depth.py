@@ -10,7 +10,7 @@ from cellplan.geometry.tool_columns import Columns, body_columns, depths, line_d
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.measures.tool_errors import part_poses
 from cellplan.model.cell.cell import Cell, RobotRows
-from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import ToolDepth
 from cellplan.model.task.task import Frame, Task
 from cellplan.scene.kinematics.screw_chain import Chains
@@ -35,9 +35,26 @@ def tool_depths(cell: Cell, schedule: Schedule, chains: Chains, q: RobotRows) ->
     round the deepest of these; a program that is too long for that is cut into even steps of motion.
     """
     return tuple(
-        _task_depth(cell, scheduled, schedule.times, chains=chains, q=q)
+        task_depth(cell, scheduled.task, schedule.times, chains=chains, q=q)
         for scheduled in schedule.tasks
         if scheduled.task.relative_to is Frame.PART
+    )
+
+
+def task_depth(cell: Cell, task: Task, times: Array, *, chains: Chains, q: RobotRows) -> ToolDepth:
+    """The same of one task on the part, at times in [s], shape (M,), from the positions of its tool and of the part."""
+    robot = cell.robot(task.robot)
+    fine_times, X_PT = _tool_on_part(cell, task, times, chains=chains, q=q)
+    X_ST = inverse(cell.part.X_PS) @ X_PT
+    X_FT, bodies, zone = robot.tool.X_FT, robot.bodies_at_work, cell.checks.contact_zone_mm.si
+    along = line_depths(X_FT, cell.part.shape, X_ST, zone=zone, is_all=not bodies)
+    deepest = [(AXIS, int(np.argmax(along)), float(along.max()))]
+    for body in bodies:
+        columns = body_columns(body.shape, inverse(X_FT) @ body.X_BS, zone)
+        deepest.append((body.name, *_deepest(columns, cell, X_ST)))
+    name, row, depth = max(deepest, key=lambda entry: entry[2])
+    return ToolDepth(
+        task=task.name, robot=task.robot, depth=depth, at_s=float(fine_times[row]), limit=task.tool_depth, body=name
     )
 
 
@@ -83,24 +100,6 @@ def tool_reach(cell: Cell, robot: str) -> float:
     along = abs(float(tool.X_FT[:3, 3] @ tool.X_FT[:3, 2]))
     columns = (body_columns(body.shape, inverse(tool.X_FT) @ body.X_BS, zone) for body in bodies)
     return max([along, zone, *(column.reach for column in columns)])
-
-
-def _task_depth(cell: Cell, scheduled: TaskSchedule, times: Array, *, chains: Chains, q: RobotRows) -> ToolDepth:
-    """The largest depth of one task's tool, its time and the deepest body of the tool."""
-    task = scheduled.task
-    robot = cell.robot(task.robot)
-    fine_times, X_PT = _tool_on_part(cell, task, times, chains=chains, q=q)
-    X_ST = inverse(cell.part.X_PS) @ X_PT
-    X_FT, bodies, zone = robot.tool.X_FT, robot.bodies_at_work, cell.checks.contact_zone_mm.si
-    along = line_depths(X_FT, cell.part.shape, X_ST, zone=zone, is_all=not bodies)
-    deepest = [(AXIS, int(np.argmax(along)), float(along.max()))]
-    for body in bodies:
-        columns = body_columns(body.shape, inverse(X_FT) @ body.X_BS, zone)
-        deepest.append((body.name, *_deepest(columns, cell, X_ST)))
-    name, row, depth = max(deepest, key=lambda entry: entry[2])
-    return ToolDepth(
-        task=task.name, robot=task.robot, depth=depth, at_s=float(fine_times[row]), limit=task.tool_depth, body=name
-    )
 
 
 def _tool_on_part(cell: Cell, task: Task, times: Array, *, chains: Chains, q: RobotRows) -> tuple[Array, Array]:

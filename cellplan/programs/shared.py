@@ -3,10 +3,11 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
+from cellplan.geometry.arrays import Array
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.promises.orders import Orders, certified_orders, scenes_of_motions
@@ -14,6 +15,7 @@ from cellplan.programs.rows.played import ExecutedProgram
 from cellplan.scene.scene import Scene
 
 Result = TypeVar("Result")
+SAME_DECIMALS: Final = 9  # of a time in [s], or a position in [rad] or [m]: a nanometre decides about no depth
 
 
 class Shared:
@@ -62,3 +64,11 @@ def played_digest(played: ExecutedProgram) -> str:
     for name, shares in played.shares.items():
         state.update(repr((name, shares.shape)).encode() + np.ascontiguousarray(shares).tobytes())
     return state.hexdigest()
+
+
+def motion_digest(*arrays: Array) -> bytes:
+    """SHA-256 of times in [s] and positions in [rad] or [m], shape (M, ...); those that differ by rounding share it."""
+    state = hashlib.sha256(repr([values.shape for values in arrays]).encode())
+    for values in arrays:
+        state.update((np.round(values, SAME_DECIMALS) + 0.0).tobytes())  # no negative zeros
+    return state.digest()

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from cellplan.geometry import tool_columns
+from cellplan.geometry.line_spans import Spans, line_spans
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.tool_columns import axis_depths, body_columns, depths, line_depths
@@ -131,3 +133,24 @@ def test_moving_part_and_tool_together_changes_no_depth() -> None:
     moved = Mesh(vertices=block.vertices @ X[:3, :3].T + X[:3, 3], faces=block.faces, source="moved", is_closed=True)
 
     assert np.allclose(depths(columns, BLOCK, X_ST), depths(columns, moved, X @ X_ST), atol=1e-9)
+
+
+def test_columns_of_poses_beside_a_mesh_meet_no_triangle_and_no_depth_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    part, columns = tessellate(BLOCK), body_columns(ROD, pose((0.0, 0.0, -0.05)), ZONE)
+    X_ST = np.concatenate([at(*rng.uniform(-0.3, 0.3, 3), lean) for lean in rng.uniform(-1.5, 1.5, 200)])
+    counts: list[int] = []
+
+    def counting(shape: Solid, points: Array, directions: Array) -> Spans:
+        counts.append(len(points) if isinstance(shape, Mesh) else 0)
+        return line_spans(shape, points, directions)
+
+    monkeypatch.setattr(tool_columns, "line_spans", counting)
+    near = depths(columns, part, X_ST)
+    followed = sum(counts)
+    monkeypatch.setattr(tool_columns, "_spans_near", lambda _, *lines: line_spans(*lines))
+
+    assert np.array_equal(near, depths(columns, part, X_ST))
+    assert np.count_nonzero(near) > 20
+    assert followed < 0.5 * len(X_ST) * len(columns.line)
+    assert depths(columns, part, at(1.0, 0.0, 0.0)) == 0.0

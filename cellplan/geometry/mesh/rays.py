@@ -159,7 +159,7 @@ def line_crossings(mesh: Mesh, points: Array, directions: Array) -> Crossings:
     middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
     ahead = np.sum((middle - points) * directions, axis=1)
     lines, distances, enters = [], [], []
-    for first in range(0, len(points), RAY_CHUNK):
+    for first in range(0, len(points) or 1, RAY_CHUNK):
         chosen = slice(first, first + RAY_CHUNK)
         starts = points[chosen] + ahead[chosen, None] * directions[chosen]
         line, _, distance, steep = _all_hits(tree, triangles, starts, rays=directions[chosen])
@@ -190,26 +190,33 @@ def _all_hits(tree: _Tree, triangles: Array, starts: Array, *, rays: Array) -> t
     The last is below zero where the ray crosses against the triangle's normal.
     """
     ray, face = tree.near(starts, rays)
-    corner = triangles[face] - starts[ray, None, :]
-    direction = rays[ray]
-    a, b, c = corner[:, 0], corner[:, 1], corner[:, 2]
-    sides = np.stack([_triple(direction, b, c), _triple(direction, c, a), _triple(direction, a, b)], axis=1)
-    slack = EDGE_TOL * np.sum(corner * corner, axis=2).max(axis=1, initial=0.0)
-    inside = np.all(sides >= -slack[:, None], axis=1) | np.all(sides <= slack[:, None], axis=1)
-    normal = np.cross(b - a, c - a)
-    steep = np.sum(normal * direction, axis=1)
-    crossing = inside & (np.abs(steep) > GRAZING_TOL * np.linalg.norm(normal, axis=1))
-    ray, face, corner = ray[crossing], face[crossing], corner[crossing]
-    distance = np.sum(normal[crossing] * corner[:, 0], axis=1) / steep[crossing]
-    depth = np.einsum("kci,ki->kc", corner, direction[crossing])
-    distance = np.clip(distance, depth.min(axis=1, initial=np.inf), depth.max(axis=1, initial=-np.inf))
-    return ray, face, distance, steep[crossing]
+    corners, origins = triangles.transpose(1, 2, 0), starts.T  # rows of components are faster than rows of points
+    a, b, c, d = (*(corner[:, face] - origins[:, ray] for corner in corners), rays.T[:, ray])
+    sides = _triple(d, b, c), _triple(d, c, a), _triple(d, a, b)
+    lowest, highest = (of(of(sides[0], sides[1]), sides[2]) for of in (np.minimum, np.maximum))
+    slack = EDGE_TOL * np.maximum(np.maximum(_dot(a, a), _dot(b, b)), _dot(c, c))
+    inside = (lowest >= -slack) | (highest <= slack)
+    ray, face = ray[inside], face[inside]
+    a, b, c, d = (vectors[:, inside] for vectors in (a, b, c, d))
+    normal = _cross(b - a, c - a)
+    steep = _dot(normal, d)
+    depth = np.array([_dot(corner, d) for corner in (a, b, c)])
+    is_crossing = np.abs(steep) > GRAZING_TOL * np.sqrt(_dot(normal, normal))
+    distance = np.divide(_dot(normal, a), steep, where=is_crossing, out=np.zeros_like(steep))
+    distance = np.clip(distance, depth.min(axis=0), depth.max(axis=0))
+    return ray[is_crossing], face[is_crossing], distance[is_crossing], steep[is_crossing]
 
 
 def _triple(d: Array, p: Array, q: Array) -> Array:
-    """``d . (p x q)`` row by row; changing p for q changes nothing but the sign, to the last bit."""
-    return (
-        d[:, 0] * (p[:, 1] * q[:, 2] - p[:, 2] * q[:, 1])
-        + d[:, 1] * (p[:, 2] * q[:, 0] - p[:, 0] * q[:, 2])
-        + d[:, 2] * (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])
-    )
+    """``d . (p x q)`` column by column; changing p for q changes nothing but the sign, to the last bit."""
+    return _dot(d, _cross(p, q))
+
+
+def _cross(p: Array, q: Array) -> Array:
+    """``p x q`` column by column, shape (3, K)."""
+    return np.array([p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]])
+
+
+def _dot(p: Array, q: Array) -> Array:
+    """``p . q`` column by column, shape (K,)."""
+    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]

@@ -122,18 +122,16 @@ def _judged_once(
     """Findings, deviations and corners of one program, kept for programs that are played and judged alike."""
 
     def judgement() -> tuple[tuple[str, ...], tuple[Deviation, ...], tuple[Deviation, ...]]:
-        findings = tuple(_program_findings(played, shared.scenes, dialect, job))
+        findings = tuple(_program_findings(played, shared, dialect, job))
         is_timed = job.frame.promise is not Promise.PACED  # or else joints pass their places at times of their own
         deviations = tuple(_deviations(played, shared.scenes, of_joints=is_timed))
-        return findings, deviations, tuple(_corners(played, shared.scenes))
+        return findings, deviations, tuple(_corners(played, shared))
 
     promise = job.frame.promise
     return shared.once((played_digest(played), promise, _is_played(dialect, promise), job.blend), judgement)
 
 
-def _program_findings(
-    played: ExecutedProgram, scenes: Sequence[Scene], dialect: Dialect, job: ExportJob
-) -> Iterator[str]:
+def _program_findings(played: ExecutedProgram, shared: Shared, dialect: Dialect, job: ExportJob) -> Iterator[str]:
     """Everything that is judged of one program."""
     yield from position_findings(played)
     promise = job.frame.promise
@@ -141,13 +139,13 @@ def _program_findings(
         is_played = _is_played(dialect, promise)
         yield from joint_findings(played, accelerations=is_played)
         if is_played:
-            for stretch, scene in _judged(played, scenes):
-                yield from motion_findings(played, stretch, scene)
-    for stretch, _ in _judged(played, scenes):
+            for stretch in _judged(played):
+                yield from motion_findings(played, stretch, shared.scenes[stretch.place])
+    for stretch in _judged(played):
         yield from _held_findings(played, stretch)
-    for stretch, scene in _judged(played, scenes):
+    for stretch in _judged(played):
         where = f"{stretch.motion.name}: " if stretch.motion.name else ""
-        yield from (where + finding for finding in path_findings(path_rows(played, stretch, scene)))
+        yield from (where + finding for finding in path_findings(path_rows(played, stretch, shared)))
 
 
 def _is_played(dialect: Dialect, promise: Promise) -> bool:
@@ -170,8 +168,8 @@ def _held_findings(played: ExecutedProgram, stretch: ExecutedStretch) -> Iterato
             )
 
 
-def _judged(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[tuple[ExecutedStretch, Scene]]:
-    """Phases with their scenes; a phase that is played as in a cycle before is left out."""
+def _judged(played: ExecutedProgram) -> Iterator[ExecutedStretch]:
+    """Phases; a phase that is played as in a cycle before is left out."""
     known: dict[int, list[Mapping[str, Array]]] = {}
     for stretch in played.stretches():
         times = played.grid(stretch.begin, stretch.end)
@@ -179,7 +177,7 @@ def _judged(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[tuple[
         before = known.setdefault(stretch.place, [])
         if not any(_is_same(q, other) for other in before):
             before.append(q)
-            yield stretch, scenes[stretch.place]
+            yield stretch
 
 
 def _is_same(one: Mapping[str, Array], other: Mapping[str, Array]) -> bool:
@@ -224,13 +222,13 @@ def _deviations(played: ExecutedProgram, scenes: Sequence[Scene], *, of_joints: 
                 yield Deviation(subject=name, largest=largest, unit=unit, at_s=at_s, phase=phase)
 
 
-def _corners(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[Deviation]:
+def _corners(played: ExecutedProgram, shared: Shared) -> Iterator[Deviation]:
     """By how much rounded rows may put the tools off, beside what they are off already."""
     has_tubes = any(rows.tube is not None for rows in played.rows.values())
     if not has_tubes and not any(np.any(shares > 0.0) for shares in played.shares.values()):
         return
-    for stretch, scene in _judged(played, scenes):
-        rows = path_rows(played, stretch, scene)
+    for stretch in _judged(played):
+        rows = path_rows(played, stretch, shared)
         times = rows.times + stretch.begin
         for scheduled in stretch.motion.schedule.tasks:
             margins = rows.tool_off(scheduled.task)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Final, TypeVar
 
 import numpy as np
@@ -21,16 +22,17 @@ from cellplan.checks.tools.between_checks import (
 )
 from cellplan.checks.tools.tracking import check_accuracy, check_closure
 from cellplan.geometry.arrays import Array, Flags
-from cellplan.measures.tool_depth import tool_depths, tool_reach
+from cellplan.measures.tool_depth import task_depth, tool_reach
 from cellplan.measures.tool_errors import closure_accuracy, part_poses, task_accuracy
 from cellplan.model.cell.cell import Relation, stacked_positions
 from cellplan.model.motion.motion import Clock, Schedule, TaskSchedule
 from cellplan.model.report.report import Check, ClosureAccuracy, TaskAccuracy, ToolDepth
-from cellplan.model.task.task import Task
+from cellplan.model.task.task import Frame, Task
 from cellplan.model.units import MM
 from cellplan.programs.rows.margins import (
     all_corners,
     in_steps,
+    movers_of,
     off_chords,
     raised,
     tool_corners,
@@ -38,6 +40,7 @@ from cellplan.programs.rows.margins import (
     tubes_at,
 )
 from cellplan.programs.rows.played import ExecutedProgram, ExecutedStretch
+from cellplan.programs.shared import Shared, motion_digest
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 
@@ -50,7 +53,8 @@ Errors = TypeVar("Errors", TaskAccuracy, ClosureAccuracy)
 class PathRows:
     """Joint positions of a phase, straight between times."""
 
-    scene: Scene  # the cell as it is in the phase
+    shared: Shared  # what exports of the run share
+    place: int  # place of the phase among the motions of the run
     schedule: Schedule  # desired tool poses at the rows of the run
     times: Array  # times in [s] on the phase's own time, shape (M,)
     q: Mapping[str, Array]  # positions of all robots there in [rad] or [m], shape (M, n), by robot
@@ -63,6 +67,11 @@ class PathRows:
     # how far tools and joints may be from straight motion on seams in each step, shape (M - 1, 4 + n), by robot; see
     # ``margins.tubes_at``
     tubes: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def scene(self) -> Scene:
+        """The cell as it is in the phase."""
+        return self.shared.scenes[self.place]
 
     @property
     def stacked(self) -> Array:
@@ -121,11 +130,12 @@ class PathRows:
         return depths
 
 
-def path_rows(played: ExecutedProgram, stretch: ExecutedStretch, scene: Scene) -> PathRows:
+def path_rows(played: ExecutedProgram, stretch: ExecutedStretch, shared: Shared) -> PathRows:
     """The path of a program in one of its phases."""
     times = played.grid(stretch.begin, stretch.end, with_corners=True)
     return PathRows(
-        scene=scene,
+        shared=shared,
+        place=stretch.place,
         schedule=stretch.motion.schedule,
         times=times - stretch.begin,
         q=played.at(times),
@@ -185,7 +195,7 @@ def _checks(rows: PathRows) -> list[Check]:
         both = [*accuracy_checks, *strict]
         checks += with_locked_joints(both, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
-    checks += check_depths(cell, _depths(rows, schedule))
+    checks += check_depths(cell, _depths(rows))
     checks += check_locked(cell, schedule.times, q)
     checks += check_mounting(scene, stacked_positions(cell, q), schedule.times)
     return checks
@@ -219,11 +229,20 @@ def _longer(vectors: Array, by: Array) -> Array:
     return vectors + by[:, None] * along
 
 
-def _depths(rows: PathRows, schedule: Schedule) -> tuple[ToolDepth, ...]:
+def straight_depths(rows: PathRows) -> Iterator[tuple[Task, ToolDepth]]:
+    """Depth of the tool of each task on the part in straight motion, once for the same motion of tool and part."""
+    is_needed, scene = rows.is_row | rows.is_break, rows.scene
+    times = rows.times[is_needed]
+    for task in (scheduled.task for scheduled in rows.schedule.tasks if scheduled.task.relative_to is Frame.PART):
+        q = {name: rows.q[name][is_needed] for name in sorted(movers_of(scene, task))}
+        evaluate = partial(task_depth, scene.cell, task, times, chains=scene.chains, q=q)
+        yield task, rows.shared.once((rows.place, task.name, motion_digest(times, *q.values())), evaluate)
+
+
+def _depths(rows: PathRows) -> tuple[ToolDepth, ...]:
     """The largest depth of the tool of each task, with what it may be deeper by rounding."""
-    depths = tool_depths(rows.scene.cell, schedule, rows.scene.chains, rows.q)
-    tasks = {scheduled.task.name: scheduled.task for scheduled in schedule.tasks}
-    return tuple(replace(depth, depth=depth.depth + float(rows.depth_off(tasks[depth.task]).max())) for depth in depths)
+    depths = straight_depths(rows)
+    return tuple(replace(depth, depth=depth.depth + float(rows.depth_off(task).max())) for task, depth in depths)
 
 
 def _at_rows(rows: PathRows, given: TaskSchedule, errors: TaskAccuracy) -> tuple[Check, ...]:

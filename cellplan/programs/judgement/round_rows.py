@@ -15,17 +15,22 @@ import numpy as np
 from cellplan.cache import without_cache
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.geometry.arrays import Array, Flags
-from cellplan.measures.tool_depth import tool_depths
 from cellplan.measures.tool_errors import error_lengths, part_poses, relative_to_task_frame
 from cellplan.model.cell.cell import Relation, stacked_positions
 from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows
-from cellplan.model.task.task import Task
 from cellplan.programs.elements.corners import LARGEST_SHARE, may_round, row_shares, units_of
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.judgement.judge import played_programs
-from cellplan.programs.judgement.judge_path import PathRows, keeps_clearance, keeps_tools, path_rows, schedule_at
+from cellplan.programs.judgement.judge_path import (
+    PathRows,
+    keeps_clearance,
+    keeps_tools,
+    path_rows,
+    schedule_at,
+    straight_depths,
+)
 from cellplan.programs.promises.orders import Orders, blocked_orders
-from cellplan.programs.rows.margins import body_reach, corner_vectors, holder_of, robot_corners
+from cellplan.programs.rows.margins import body_reach, corner_vectors, movers_of, robot_corners
 from cellplan.programs.rows.played import ExecutedProgram, ExecutedStretch
 from cellplan.programs.rows.rows import times_of
 from cellplan.programs.shared import Shared
@@ -126,7 +131,7 @@ class _Choice:
             alike = (o for o in before if all(_are_alike(played[n], self._free[n], o[n], inside[n]) for n in inside))
             same = next(alike, None)
             if same is None:
-                self._round(stretch, self._shared.scenes[stretch.place], inside)
+                self._round(stretch, inside)
                 known.append((stretch.place, inside))
             else:
                 for name, rows in inside.items():
@@ -146,47 +151,43 @@ class _Choice:
                 }
                 self._limit(between, self._shared.scene, reach)
 
-    def _round(self, stretch: ExecutedStretch, scene: Scene, inside: Mapping[str, slice]) -> None:
+    def _round(self, stretch: ExecutedStretch, inside: Mapping[str, slice]) -> None:
         """Choose the shares of a phase."""
+        scene = self._shared.scenes[stretch.place]
         begun = {name: self._chosen[name][rows].copy() for name, rows in inside.items()}
         for margin in MARGINS:
             for name, rows in inside.items():
                 self._chosen[name][rows] = begun[name]
-            if self._keep_tools(stretch, scene, margin):
+            if self._keep_tools(stretch, margin):
                 break
         else:
             self._limit(inside, scene, 0.0)
             return
         for reach in REACHES:
             self._limit(inside, scene, reach)
-            if keeps_clearance(self._rows(stretch, scene)):
+            if keeps_clearance(self._rows(stretch)):
                 return
         self._limit(inside, scene, 0.0)
 
-    def _keep_tools(self, stretch: ExecutedStretch, scene: Scene, reserve: float) -> bool:
+    def _keep_tools(self, stretch: ExecutedStretch, reserve: float) -> bool:
         """Lower shares until no tool leaves a share of what is allowed; whether all is kept then, between rows too."""
-        allowed: dict[str, float] = {}
         for _ in range(ROUNDS):
-            rows = self._rows(stretch, scene)
+            rows = self._rows(stretch)
             lowered = False
             for relation, errors, limit in _errors(rows):
                 is_over = np.any(errors > reserve * np.array(limit), axis=1)
-                lowered |= self._lower(rows.times[is_over] + stretch.begin, movers_of(scene, relation))
-            lowered |= self._lower_depths(stretch, rows, allowed, reserve)
+                lowered |= self._lower(rows.times[is_over] + stretch.begin, movers_of(rows.scene, relation))
+            lowered |= self._lower_depths(stretch, rows, reserve)
             if not lowered:
                 return keeps_tools(rows)
         return False
 
-    def _lower_depths(self, stretch: ExecutedStretch, rows: PathRows, known: dict[str, float], reserve: float) -> bool:
+    def _lower_depths(self, stretch: ExecutedStretch, rows: PathRows, reserve: float) -> bool:
         """Lower the shares of rows at which a tool may be deeper by more than it may; whether there were any."""
-        if not known:
-            known |= {task.name: limit - depth for task, depth, limit in straight_depths(rows)}
         lowered = False
-        for scheduled in rows.schedule.tasks:
-            task = scheduled.task
-            if task.name in known:
-                is_over = rows.depth_off(task) > reserve * max(known[task.name], 0.0)
-                lowered |= self._lower(rows.times[is_over] + stretch.begin, movers_of(rows.scene, task))
+        for task, straight in straight_depths(rows):
+            is_over = rows.depth_off(task) > reserve * max(straight.limit - straight.depth, 0.0)
+            lowered |= self._lower(rows.times[is_over] + stretch.begin, movers_of(rows.scene, task))
         return lowered
 
     def _lower(self, times: Array, movers: Collection[str]) -> bool:
@@ -227,9 +228,9 @@ class _Choice:
         """Share within which each row counts as rounded, by robot."""
         return row_shares(self._job, self.program)
 
-    def _rows(self, stretch: ExecutedStretch, scene: Scene) -> PathRows:
+    def _rows(self, stretch: ExecutedStretch) -> PathRows:
         """The path of a phase with the shares chosen so far."""
-        return path_rows(replace(self._played, shares=self._shares()), stretch, scene)
+        return path_rows(replace(self._played, shares=self._shares()), stretch, self._shared)
 
 
 def _inside(times: Array, stretch: ExecutedStretch) -> slice:
@@ -246,19 +247,6 @@ def _are_alike(rows: RobotRows, free: Flags, one: slice, other: slice) -> bool:
     late = np.abs(np.diff(times[one]) - np.diff(times[other]))
     off = np.abs(rows.q[one] - rows.q[other])
     return bool(np.all(late <= SAME_TIME) and np.all(off <= SAME) and np.all(free[one] == free[other]))
-
-
-def straight_depths(rows: PathRows) -> Iterator[tuple[Task, float, float]]:
-    """Depth of the tool of each task in straight motion, and what is allowed, in [m]."""
-    scene = rows.scene
-    depths = tool_depths(scene.cell, schedule_at(rows.schedule, rows.times), scene.chains, rows.q)
-    for depth in depths:
-        yield scene.cell.task(depth.task), depth.depth, depth.limit
-
-
-def movers_of(scene: Scene, relation: Relation) -> frozenset[str]:
-    """Robots that move a tool, or the part under it."""
-    return frozenset(filter(None, (relation.robot, holder_of(scene, relation))))
 
 
 def _errors(rows: PathRows) -> Iterator[tuple[Relation, Array, tuple[float, float]]]:

@@ -205,6 +205,11 @@ def holder_of(scene: Scene, relation: Relation) -> str | None:
     return holders[0].robot if holders and not in_world else None
 
 
+def movers_of(scene: Scene, relation: Relation) -> frozenset[str]:
+    """Robots that move a tool, or the part under it."""
+    return frozenset(filter(None, (relation.robot, holder_of(scene, relation))))
+
+
 def body_reach(arms: LeverArms, scene: Scene, off: Array, tips: Mapping[str, Array] = NO_TIPS) -> Array:
     """No point of an engine's body moves by more in [m] when joints are off, shape (M, nq), shape (bodies, M).
 

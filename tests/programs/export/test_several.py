@@ -16,6 +16,7 @@ from cellplan.programs.export import program
 from cellplan.programs.export.choice import Choice
 from cellplan.programs.export.exporters import EXPORTERS
 from cellplan.programs.judgement import judge as judging
+from cellplan.programs.judgement import judge_path
 from cellplan.programs.rows.rows import full_rows
 from cellplan.programs.shared import Shared
 
@@ -147,6 +148,9 @@ def test_rows_that_are_played_alike_are_judged_once_and_any_others_again(
         return result(*words)  # type: ignore[arg-type]
 
     monkeypatch.setattr(judging, "_program_findings", counting)
+    depths: list[object] = []
+    evaluate = judge_path.task_depth
+    monkeypatch.setattr(judge_path, "task_depth", lambda *of, **at: depths.append(of) or evaluate(*of, **at))
     shared, job = Shared(run), job_of(run, full_rows(run))
     read = read_back(job, decimals=9)
 
@@ -165,7 +169,10 @@ def test_rows_that_are_played_alike_are_judged_once_and_any_others_again(
     assert count(changed=_later) == 1
     assert count(interpolation=Interpolation.CUBIC) == 1
     assert count(is_thinned=True) == 1
+    assert depths
+    depths.clear()
     assert count(program=replace(job, blend=0.1)) == 1
+    assert not depths  # rounded rows count with what they may be off: straight motion is the same
     assert count() == 0
     shared = Shared(run)
     assert count() == 1
