@@ -13,6 +13,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.report.exported import ExportJob, ProgramRows, Promise
 from cellplan.model.settings.controllers import HandshakeEntry
 from cellplan.programs.dialects import DIALECTS
+from cellplan.programs.elements.frames import carried_poses
 from cellplan.programs.formats.urscript.reader import read_urscript
 from cellplan.programs.formats.urscript.rows import blend_radii, move_acceleration, move_speeds
 from cellplan.programs.formats.urscript.writer import render_urscript
@@ -302,6 +303,8 @@ def test_tool_tips_are_those_of_the_kinematics() -> None:
     q = rng.uniform(-3.0, 3.0, (50, 6))
 
     assert np.abs(tool_tips(robot, q) - ScrewChain(robot).tool_poses(q)[:, :3, 3]).max() <= 1e-12
+    poses = robot.X_WB @ carried_poses(robot, q, robot.tool.X_FT)
+    assert np.abs(poses - ScrewChain(robot).tool_poses(q)).max() <= 1e-12
 
 
 def test_moves_are_no_faster_than_joints_and_plan() -> None:
