@@ -194,10 +194,9 @@ def _against_synchronised(export: _Export) -> _Against | None:
     """Why the robots do not pass the same rows at the same time."""
     cell, robots = export.run.cell, export.robots
     dialect = export.dialect
-    has_lines = dialect.has_part_targets or dialect.has_lines_of(map(cell.robot, robots))
-    if export.moves is Moves.LINEAR and not has_lines:
-        arms = "other than one arm" if dialect.has_seams_in_step else "robots"
-        return _Against(f"{dialect.name} moves tools by joints where {arms} move in step (--moves joints)")
+    no_lines = _no_lines(export)
+    if export.moves is Moves.LINEAR and not dialect.has_part_targets and no_lines:
+        return _Against(f"{no_lines} (--moves joints)")
     is_free = export.requested is None and dialect.has_joint_seams and export.moves is Moves.LINEAR
     if is_free and _against_sequence(export) is None:
         return _Against(f"{dialect.name} moves tools relative to another robot only where the part moves meanwhile")
@@ -210,6 +209,15 @@ def _against_synchronised(export: _Export) -> _Against | None:
     if others:
         return _Against(f"{listed(sorted(others))} moves too and is not in the program of controller {names[0]}")
     return None
+
+
+def _no_lines(export: _Export) -> str:
+    """Why tools do not move on lines and arcs while robots move in step; empty where they do."""
+    dialect = export.dialect
+    if dialect.has_lines_of(map(export.run.cell.robot, export.robots)):
+        return ""
+    arms = "other than one arm" if dialect.has_seams_in_step else "robots"
+    return f"{dialect.name} moves tools by joints where {arms} move in step"
 
 
 def _against_sequence(export: _Export) -> _Against | None:
@@ -236,9 +244,11 @@ def _remarks(export: _Export, promise: Promise) -> Iterator[str]:
                 yield from _unmet(export)
         case Promise.SYNCHRONISED:
             yield "same row at the same time within the blend zones; the controller may take longer than planned"
-            if export.dialect.has_lines_of(map(cell.robot, export.robots)) and export.moves is not Moves.JOINTS:
+            if not _no_lines(export) and export.moves is not Moves.JOINTS:
                 yield "on seams the tool moves at the programmed speed on the part, also where the part moves"
                 yield from _processes(export)
+            elif export.dialect.has_seams_in_step and export.moves is Moves.AUTO:
+                yield f"no lines: {_no_lines(export)}"
             yield from _stays(export)
         case Promise.PACED:
             yield "on seams the tool moves at the programmed speed; times between robots are not kept"

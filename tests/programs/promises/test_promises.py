@@ -107,6 +107,18 @@ def test_tools_are_moved_on_lines_in_step_only_where_a_format_has_targets_on_the
         assert choose_promise(both, dialect, ("left", "right"), moves=moves).promise is Promise.SYNCHRONISED
 
 
+def test_lines_in_step_are_those_of_the_only_arm(run: VerifiedRun) -> None:
+    """Others move by joints, which is said where lines may be and refused where they must be."""
+    both = on_controllers(run, controllers("c", "d"), left="c", right="c", idle="d")
+    dialect, arms = replace(IN_STEP, moves=tuple(Moves), has_seams_in_step=True), ("left", "right")
+
+    auto = choose_promise(both, dialect, arms, moves=Moves.AUTO)
+
+    assert "no lines: in-step moves tools by joints where other than one arm move in step" in auto.remarks
+    with pytest.raises(NotVerifiedError, match=r"where other than one arm move in step \(--moves joints\)"):
+        choose_promise(both, dialect, arms, moves=Moves.LINEAR)
+
+
 def test_programs_without_times_say_that_they_do_not_wait_while_a_tool_is_cleaned(run: VerifiedRun) -> None:
     one = on_controllers(run, controllers("c"), left="c", right="c", idle="c")
     service = Service(posture=np.zeros(6), takes=8.0, most=1)
