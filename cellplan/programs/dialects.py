@@ -33,6 +33,7 @@ DIALECTS: Final["MutableMapping[str, Dialect]"] = _Formats(
 )
 ESCAPES: Final["MutableMapping[str, EscapeForm]"] = _Formats(
     fanuc_ls="fanuc_ls.escape:TP_ESCAPE",
+    inform="inform.escape:INFORM_ESCAPE",
     krl="krl.escape:KRL_ESCAPE",
     rapid="rapid.escape:RAPID_ESCAPE",
     urscript="urscript.escape:URSCRIPT_ESCAPE",

@@ -307,6 +307,7 @@ def test_one_robot_goes_home_from_any_place_of_its_program(moves: Moves, tmp_pat
 
 def test_formats_without_escape_programs_are_refused(in_turn: VerifiedRun) -> None:
     with pytest.raises(
-        InputError, match=r"^--escape: expected one of the formats fanuc_ls, krl, rapid, urscript, val3, got csv"
+        InputError,
+        match=r"^--escape: expected one of the formats fanuc_ls, inform, krl, rapid, urscript, val3, got csv",
     ):
         escape_programs(in_turn, "csv", Choice())

@@ -240,7 +240,7 @@ def _programs(
                 legs.append((begin + 1, begin + len(moved)) if len(moved) else None)
                 homeward.append(moved)
             first, last = marks[route.number - 1], marks[route.number]
-            off = _off(prepared, passed, slice(first, last + 1), form.angle)
+            off = "" if form.read else _off(prepared, passed, slice(first, last + 1), form.angle)
             steps.append(EscapeStep(route.number, back.index(first) + 1, back.index(last) + 1, off, tuple(legs)))
         notes = [line[2:] for note in _notes(run, prepared, name) for line in comment(note, "#")]
         programs[name] = EscapeProgram(

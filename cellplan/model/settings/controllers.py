@@ -196,7 +196,7 @@ class RobotControlEntry(Entry):
     step_register: Signal | None = setting(
         None,
         "Variable, or number of the register, in which its program keeps the step that an escape program begins from; "
-        "cell_step, or register 24 of kind ur, or 81 of kind fanuc, when absent.",
+        "cell_step, or register 24 of kind ur, 81 of kind fanuc, or variable D081 of kind yaskawa, when absent.",
     )
 
     @model_validator(mode="before")

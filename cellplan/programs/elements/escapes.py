@@ -33,7 +33,8 @@ from cellplan.programs.elements.joints import Angle, Axes, from_numbers, unit_of
 from cellplan.programs.elements.paced import Events
 
 REGISTER: Final = "cell_step"  # name of a step register where the cell states none
-NUMBERED: Final = {"fanuc": "81", "ur": "24"}  # by kind of controller, its number where registers have no names
+# by kind of controller, its number where registers have no names, with as many digits as it has
+NUMBERED: Final = {"fanuc": "81", "ur": "24", "yaskawa": "081"}
 SPEED: Final = 10  # [%] of the top speed
 
 
@@ -70,20 +71,27 @@ class EscapeForm:
 
     sign: str  # of a comment
     case: str  # statements with their fields in braces, of which any may name the program: where a step begins
-    back: str
-    go: str
     meet: str
     agree: tuple[str, str]  # with an even number and with an odd one
     pause: str  # longer than signals take
     register: str
-    tables: tuple[str, str]  # what a line with the beginning of the rows of the program holds, and of those home
-    row: str  # pattern of a line with numbers of a row, which are its only group
-    numbers: Callable[[Robot, str], Sequence[float]]  # the numbers: of an arm, then of the axes before it
     angle: Angle
     events: Callable[[ExportFrame, str], Events]  # what stands between the moves of a main program
     sources: Callable[[ExportFrame, str], str]  # pattern of the paths of a main program that hold its marks
     render: Callable[[EscapeProgram], dict[str, str]]
     require: Callable[[ExportFrame, str], None]  # refuses a register that the language does not take
+    back: str = ""
+    go: str = ""
+    tables: tuple[str, str] = ("", "")  # what a line with the begin of the rows of the program holds, and of those home
+    row: str = ""  # pattern of a line with numbers of a row, which are its only group
+    # the numbers: of an arm, then of the axes before it
+    numbers: Callable[[Robot, str], Sequence[float]] = lambda _robot, _text: ()
+    # what a reader of its own finds, where rows do not stand line by line
+    read: Callable[[EscapeProgram, Mapping[str, str]], EscapeProgram] | None = None
+    # where no program can tell between which rows an arm stands: begin of motions behind a mark, before each of which
+    # the register is counted up by a statement, and how much more it holds from mark to mark
+    counted: tuple[str, str] = ("", "")
+    unit: int = 1
     program: Callable[[ExportFrame, str], str] = lambda _frame, _robot: ""  # what statements name the program
     scope: str = ""  # before the register in escape programs
     # line of a main program behind which the register is declared, and the declaration; empty where none is needed
@@ -159,9 +167,11 @@ def agreement_steps(frame: ExportFrame, robot: str, *, is_odd: bool) -> list[Han
 def register_of(frame: ExportFrame, robot: str) -> str:
     """Name or number of the step register of a robot."""
     control = frame.robot(robot).control
-    if control is not None and control.step_register is not None:
-        return str(control.step_register)
-    return REGISTER if control is None else NUMBERED.get(frame.cell.controllers[control.id].kind, REGISTER)
+    if control is None:
+        return REGISTER
+    usual = NUMBERED.get(frame.cell.controllers[control.id].kind, REGISTER)
+    stated = usual if control.step_register is None else str(control.step_register)
+    return stated.zfill(len(usual)) if usual.startswith("0") else stated
 
 
 def with_register(dialect: Dialect, form: EscapeForm) -> Dialect:
@@ -171,7 +181,8 @@ def with_register(dialect: Dialect, form: EscapeForm) -> Dialect:
         return _with_steps(form, job.frame, dialect.render(job))
 
     def read(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
-        kinds = form.register, form.register.replace("{value}", form.following), form.declaration[1]
+        counted = form.register.replace("{value}", form.following), form.counted[1]
+        kinds = form.register, *counted, form.declaration[1]
         statements = [_pattern(statement) for statement in kinds if statement]
         plain, blank = dict[str, str](), dict[str, str]()
         for path, text in files.items():
@@ -212,6 +223,14 @@ def read_escape(form: EscapeForm, expected: EscapeProgram, files: Mapping[str, s
 
     ``InputError`` with file and line for any other statement. Of what is expected only frame and robot are used.
     """
+    read = (form.read or partial(_read_lines, form))(expected, files)
+    for path, text in form.render(read).items():
+        require_same(path, text, files.get(path, ""))
+    return read
+
+
+def _read_lines(form: EscapeForm, expected: EscapeProgram, files: Mapping[str, str]) -> EscapeProgram:
+    """What files hold whose rows stand line by line."""
     robot = expected.frame.robot(expected.robot)
     reader, notes = _EscapeReader(form, robot), list[str]()
     for place, (path, text) in enumerate(files.items()):
@@ -227,10 +246,7 @@ def read_escape(form: EscapeForm, expected: EscapeProgram, files: Mapping[str, s
         from_numbers(robot, np.array(table, dtype=float).reshape(-1, len(reader.order)), angle=form.angle)
         for table in reader.tables
     )
-    read = replace(expected, notes=tuple(notes), rows=rows, homeward=homeward, steps=tuple(reader.steps))
-    for path, text in form.render(read).items():
-        require_same(path, text, files.get(path, ""))
-    return read
+    return replace(expected, notes=tuple(notes), rows=rows, homeward=homeward, steps=tuple(reader.steps))
 
 
 class _EscapeReader:
@@ -307,10 +323,12 @@ def _with_steps(form: EscapeForm, frame: ExportFrame, files: Mapping[str, str]) 
             lines, texts = list[str](), files[path].split("\n")
             places = _places(form, frame, robot, [*map(form.plain, texts)])
             for place, line in enumerate(texts):
+                if number and form.counted[0] and line.startswith(form.counted[0]):
+                    lines.append(form.counted[1].format(name=name) + line[len(line.rstrip("\r")) :])
                 lines.append(line)
                 if place in places:
                     number += places[place] == 1
-                    value = form.following.format(name=name) if frame.promise is Promise.PACED else str(number)
+                    value = form.following.format(name=name) if frame.promise is Promise.PACED else form.unit * number
                     statement = form.declaration[1] if places[place] == 2 else form.register
                     text = form.line.format(statement.format(name=name, value=value if places[place] else "0"))
                     indent, end = line[: len(line) - len(line.lstrip())], line[len(line.rstrip("\r")) :]

@@ -58,9 +58,9 @@ def are_on_one_circle(p: Array) -> bool:
 
 
 def tool_pose(robot: Robot, q: Array) -> Array:
-    """The tool of a robot in the world in [m], shape (4, 4), for joints in [rad], shape (6,)."""
-    pose: Array = ScrewChain(robot).tool_poses(q[None])[0]
-    return pose
+    """The tool of a robot in the world in [m], shape (4, 4), for joints in [rad], shape (6,); of many, for (N, 6)."""
+    poses: Array = ScrewChain(robot).tool_poses(np.atleast_2d(q))
+    return poses[0] if q.ndim == 1 else poses
 
 
 def joints_of(robot: Robot, X_WT: Array, stated: NDArray[np.int_]) -> Array | None:

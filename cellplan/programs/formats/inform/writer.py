@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cellplan.errors import InputError, NotVerifiedError, raise_findings, refusals
 from cellplan.geometry.transforms import Array, inverse
+from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportJob, Moves, ProgramRows, Promise, RobotRows, Seam
 from cellplan.programs.elements.conventions import convention_of
 from cellplan.programs.elements.corners import LARGEST_SHARE
@@ -64,8 +65,8 @@ def render_inform(job: ExportJob) -> dict[str, str]:
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
-class _Job:
-    """A job while it is written."""
+class Job:
+    """A job while it is written; ``stated`` is the configuration of its last position."""
 
     name: str
     frame: JobFrame
@@ -73,7 +74,7 @@ class _Job:
     positions: list[str] = field(default_factory=list)  # with the lines of their configurations
     statements: list[str] = field(default_factory=list)
     count: int = 0  # of its positions
-    stated: str = ""  # configuration of the last one
+    stated: str = ""
 
     def position(self, X: Array, numbers: Sequence[int]) -> str:
         """Add a pose in its frame in [m] with a configuration; its name."""
@@ -82,10 +83,26 @@ class _Job:
             self.positions.append(f"///RCONF {stated}")
             self.stated = stated
         pose = convention_of(KIND).numbers(X)
+        half = fixed(-180.0, self.decimals + 1)  # a half turn is a positive one, whatever rounding makes of it
         fields = [fixed(number, self.decimals + (place >= 3)) for place, number in enumerate(pose.tolist())]
+        fields = [field.removeprefix("-") if field == half else field for field in fields]
         name, self.count = f"C{self.count:05d}", self.count + 1
         self.positions.append(f"{name}={','.join(fields)}")
         return name
+
+    def joints(self, robot: Robot, q: Array, where: str) -> str:
+        """Add the pose of a robot from which joints in [rad], shape (6,), are solved again; its name."""
+        X_WT, stated = tool_pose(robot, q), configuration(robot, q[None])[0]
+        solved = joints_of(robot, X_WT, stated)
+        if stated[REAR] or solved is None or np.abs(solved - q).max() > SAME_JOINTS:
+            reason = "the wrist is behind axis S" if stated[REAR] else "the wrist is straight, or an axis on an edge"
+            raise NotVerifiedError(
+                [
+                    f"robot '{robot.name}', {where}: pose and configuration do not tell its joints, as "
+                    f"{reason}, and INFORM states joints in pulses only: lead the motion elsewhere (home, via)"
+                ]
+            )
+        return self.position(inverse(self.frame.X_WC) @ X_WT, stated.tolist())
 
     def text(self, remark: str, notes: Sequence[str]) -> str:
         """Its text."""
@@ -145,7 +162,7 @@ class _RobotWriter:
         """Text of its files."""
         _, names = job_names(self.job.frame)
         robot = self.part.placed
-        main = _Job(name=self.part.name, frame=JobFrame.of(robot, None), decimals=self._decimals)
+        main = Job(name=self.part.name, frame=JobFrame.of(robot, None), decimals=self._decimals)
         main.statements += self.events.before(bool(self.rows.marks))
         jobs = [main]
         for seam, moves in blocks(self.moves):
@@ -153,7 +170,7 @@ class _RobotWriter:
                 self._add(main, None, moves)
                 continue
             station = self.job.frame.station(robot.name, seam.task)
-            jobs.append(_Job(name=names[seam.task], frame=JobFrame.of(robot, station), decimals=self._decimals))
+            jobs.append(Job(name=names[seam.task], frame=JobFrame.of(robot, station), decimals=self._decimals))
             main.statements.append(f"CALL JOB:{jobs[-1].name}")
             self._add(jobs[-1], seam, moves)
         if len({one.name for one in jobs}) < len(jobs):
@@ -167,7 +184,7 @@ class _RobotWriter:
         """Decimals of a millimetre."""
         return self.part.decimals
 
-    def _add(self, job: _Job, seam: Seam | None, moves: Sequence[Move]) -> None:
+    def _add(self, job: Job, seam: Seam | None, moves: Sequence[Move]) -> None:
         """Motions of a block, each with what follows it."""
         before: Move | None = None
         for move in moves:
@@ -178,23 +195,12 @@ class _RobotWriter:
             job.statements += self.events.texts(None if seam is None else seam.task, move.switches)
             before = move
 
-    def _joint_motion(self, job: _Job, move: Move) -> str:
+    def _joint_motion(self, job: Job, move: Move) -> str:
         """A motion of joints, to a pose from which they are solved again."""
-        robot, q, stated = self.part.placed, self.rows.q[move.row], self.configurations[move.row]
-        X_WT = tool_pose(robot, q)
-        solved = joints_of(robot, X_WT, stated)
-        if stated[REAR] or solved is None or np.abs(solved - q).max() > SAME_JOINTS:
-            reason = "the wrist is behind axis S" if stated[REAR] else "the wrist is straight, or an axis on an edge"
-            raise NotVerifiedError(
-                [
-                    f"robot '{robot.name}', row {move.row + 1}: pose and configuration do not tell its joints, as "
-                    f"{reason}, and INFORM states joints in pulses only: lead the motion elsewhere (home, via)"
-                ]
-            )
-        point = job.position(inverse(job.frame.X_WC) @ X_WT, stated.tolist())
+        point = job.joints(self.part.placed, self.rows.q[move.row], f"row {move.row + 1}")
         return f"MOVJ {point} VJ={fixed(self.part.speeds[move.row], 2)} {self._level(move)}"
 
-    def _tool_motions(self, job: _Job, seam: Seam, before: Move, move: Move) -> Iterator[str]:
+    def _tool_motions(self, job: Job, seam: Seam, before: Move, move: Move) -> Iterator[str]:
         """A line, or the motions of an arc."""
         speed = f"V={speed_text(move.feed, seam.task)}"
         if move.middle is not None and self._goes_on(job, seam, before, move):
@@ -207,7 +213,7 @@ class _RobotWriter:
         kind = "MOVL" if move.middle is None else "MOVC"
         yield f"{kind} {self._point(job, seam, move.row)} {speed} {self._level(move)}"
 
-    def _goes_on(self, job: _Job, seam: Seam, before: Move, move: Move) -> bool:
+    def _goes_on(self, job: Job, seam: Seam, before: Move, move: Move) -> bool:
         """Whether an arc goes on along the circle of the one before, with no statement between and as fast."""
         if before.middle is None or before.feed != move.feed or not job.statements[-1].startswith("MOVC"):
             return False
@@ -219,11 +225,11 @@ class _RobotWriter:
         """The position level at the end of a motion."""
         return f"PL={self.levels[move.row]}"
 
-    def _point(self, job: _Job, seam: Seam, row: int) -> str:
+    def _point(self, job: Job, seam: Seam, row: int) -> str:
         """The position of a row of a seam."""
         return job.position(self._pose(job, seam, row), self.configurations[row].tolist())
 
-    def _pose(self, job: _Job, seam: Seam, row: int) -> Array:
+    def _pose(self, job: Job, seam: Seam, row: int) -> Array:
         """The tool at a row of a seam, in the frame of its job."""
         X_PT = self.rows.X_PT
         if row > seam.first and X_PT is not None:
