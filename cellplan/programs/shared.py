@@ -10,7 +10,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.verified_run import VerifiedRun
-from cellplan.programs.promises.orders import Orders, certified_orders, scenes_of_motions
+from cellplan.programs.promises.orders import KnownOrders, Orders, certified_orders, scenes_of_motions
 from cellplan.programs.rows.played import ExecutedProgram
 from cellplan.scene.scene import Scene
 
@@ -27,6 +27,7 @@ class Shared:
     def __init__(self, run: VerifiedRun) -> None:
         """Begin with nothing."""
         self.run = run
+        self.known_orders: KnownOrders = {}
         self._results: dict[object, Any] = {}
 
     @cached_property
@@ -66,9 +67,12 @@ def played_digest(played: ExecutedProgram) -> str:
     return state.hexdigest()
 
 
-def motion_digest(*arrays: Array) -> bytes:
-    """SHA-256 of times in [s] and positions in [rad] or [m], shape (M, ...); those that differ by rounding share it."""
+def motion_digest(*arrays: Array, is_exact: bool = False) -> bytes:
+    """SHA-256 of times in [s] and positions in [rad] or [m], shape (M, ...).
+
+    Those that differ by rounding share it, unless it is to be exact.
+    """
     state = hashlib.sha256(repr([values.shape for values in arrays]).encode())
     for values in arrays:
-        state.update((np.round(values, SAME_DECIMALS) + 0.0).tobytes())  # no negative zeros
+        state.update((values if is_exact else np.round(values, SAME_DECIMALS) + 0.0).tobytes())  # no negative zeros
     return state.digest()

@@ -11,7 +11,7 @@ from typing import Final, Literal, NamedTuple, NoReturn
 
 import numpy as np
 
-from cellplan.errors import InputError, LineRefusedError, NotVerifiedError
+from cellplan.errors import InputError, LineRefusedError
 from cellplan.geometry.transforms import Array
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows, Seam
 from cellplan.model.units import MM
@@ -202,8 +202,10 @@ def _triggers(events: Events, seam: Seam | None, switches: Switches, *, is_tool:
             continue
         if not is_tool or (on and switches.waits):
             why = "robots wait for one another" if is_tool else "no line or arc leads (approach_mm)"
-            text = f"task '{seam.task}': {which}_lead_s: no output is switched ahead where its process begins, as {why}"
-            raise NotVerifiedError([f"{text} there: leave it out"])
+            text = (
+                f": {which}_lead_s: no output is switched ahead where its process begins, as {why} there: leave it out"
+            )
+            raise LineRefusedError(seam.task, text)
         texts += events.triggers(seam.task, on)
     return tuple(texts)
 

@@ -16,6 +16,7 @@ from cellplan.programs.elements.joints import in_step
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import THIN_DEG, THIN_MM, Choice, exported_robots
 from cellplan.programs.export.refusals import frame_of, is_at_cycle, unmet_demands
+from cellplan.programs.judgement.refused_lines import refused_lines
 from cellplan.programs.judgement.round_rows import stops_left, with_rounding
 from cellplan.programs.promises.orders import Orders
 from cellplan.programs.promises.promises import Promised, choose_promise, controllers_of
@@ -127,18 +128,19 @@ def _job(
         every, essential = full_rows(shared.run), essential_rows(shared.run)
         return job, lead, tuple(feeds_in_step(job.programs, every, essential)) if dialect.states_poses(frame) else ()
     most = (THIN_MM if choice.thin_mm is None else choice.thin_mm) / MM
-    job, by_joints = _with_lines(shared, dialect, job, _with_orders(full_rows(shared.run), orders), most=most)
+    job, by_joints = _with_lines(shared, dialect, job, orders, most=most)
     return job, lead, tuple(_moved_by_joints(frame, by_joints))
 
 
 def _with_lines(
-    shared: Shared, dialect: Dialect, job: ExportJob, full: tuple[ProgramRows, ...], *, most: float
+    shared: Shared, dialect: Dialect, job: ExportJob, orders: Sequence[Orders], *, most: float
 ) -> tuple[ExportJob, dict[str, str]]:
     """A job with lines and arcs, and why the tools of some tasks move by joints instead, by their names.
 
     ``NotVerifiedError`` where none may, as the moves are to be linear, and ``_NoLineError`` where all would have to.
     """
     frame, essential = job.frame, essential_rows(shared.run)
+    full = _with_orders(full_rows(shared.run), orders)
     by_joints: dict[str, str] = {}
     for task, holder in on_moving_parts(full, essential) if frame.promise.waits else ():
         if (robot := frame.cell.task(task).robot) in frame.robots and holder not in in_step(frame, robot):
@@ -155,11 +157,13 @@ def _with_lines(
         if not any(rows.seams for program in lines.programs for rows in program.robots.values()):
             raise _NoLineError([f"task '{task}': {reason}" for task, reason in by_joints.items()])
         try:
-            executed_programs(lines, dialect, full, dialect.read(frame, dialect.render(lines)))
+            executed = executed_programs(lines, dialect, full, dialect.read(frame, dialect.render(lines)))
+            refused = refused_lines(shared, dialect, lines, executed, orders=orders)
         except LineRefusedError as error:
-            by_joints[error.task] = error.reason
-        else:
+            refused = {error.task: error.reason}
+        if not refused:
             return lines, by_joints
+        by_joints |= refused
 
 
 def _moved_by_joints(frame: ExportFrame, by_joints: Mapping[str, str]) -> Iterator[str]:

@@ -69,8 +69,9 @@ def judged(
     findings = list(judgement.findings)
     if not findings and prepared.orders:
         played = played_programs(run, prepared.dialect, prepared.job, judgement.executed, lead=prepared.lead)
+        known = prepared.shared.known_orders
         corners = [robot_corners(program) for program in played]
-        findings += certify_written(run, prepared.orders, judgement.executed, corners, progress=progress)
+        findings += certify_written(run, prepared.orders, judgement.executed, corners, known=known, progress=progress)
     if findings:
         named = [f"{prepared.dialect.name}: {finding}" for finding in findings]
         raise NotVerifiedError([*named, *_unresolved(run, prepared, named), *_stated_coarsely(run, prepared)])

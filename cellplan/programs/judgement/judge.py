@@ -92,7 +92,7 @@ def judge(
     return Judgement(
         findings=tuple(dict.fromkeys(findings)),
         deviations=_largest(deviations),
-        not_judged=tuple(_not_judged(dialect, job, read)),
+        not_judged=tuple(_notjudged_stretches(dialect, job, read)),
         corners=_largest(corners),
         rounded=_rounded(job, read),
         executed=executed,
@@ -139,11 +139,11 @@ def _program_findings(played: ExecutedProgram, shared: Shared, dialect: Dialect,
         is_played = _is_played(dialect, promise)
         yield from joint_findings(played, accelerations=is_played)
         if is_played:
-            for stretch in _judged(played):
+            for stretch in judged_stretches(played):
                 yield from motion_findings(played, stretch, shared.scenes[stretch.place])
-    for stretch in _judged(played):
+    for stretch in judged_stretches(played):
         yield from _held_findings(played, stretch)
-    for stretch in _judged(played):
+    for stretch in judged_stretches(played):
         where = f"{stretch.motion.name}: " if stretch.motion.name else ""
         yield from (where + finding for finding in path_findings(path_rows(played, stretch, shared)))
 
@@ -168,7 +168,7 @@ def _held_findings(played: ExecutedProgram, stretch: ExecutedStretch) -> Iterato
             )
 
 
-def _judged(played: ExecutedProgram) -> Iterator[ExecutedStretch]:
+def judged_stretches(played: ExecutedProgram) -> Iterator[ExecutedStretch]:
     """Phases; a phase that is played as in a cycle before is left out."""
     known: dict[int, list[Mapping[str, Array]]] = {}
     for stretch in played.stretches():
@@ -227,7 +227,7 @@ def _corners(played: ExecutedProgram, shared: Shared) -> Iterator[Deviation]:
     has_tubes = any(rows.tube is not None for rows in played.rows.values())
     if not has_tubes and not any(np.any(shares > 0.0) for shares in played.shares.values()):
         return
-    for stretch in _judged(played):
+    for stretch in judged_stretches(played):
         rows = path_rows(played, stretch, shared)
         times = rows.times + stretch.begin
         for scheduled in stretch.motion.schedule.tasks:
@@ -268,7 +268,7 @@ def _largest(deviations: Iterable[Deviation]) -> tuple[Deviation, ...]:
     return tuple(largest_of(deviations, lambda deviation: (deviation.subject, deviation.unit)))
 
 
-def _not_judged(dialect: Dialect, job: ExportJob, read: Sequence[ProgramRows]) -> Iterator[str]:
+def _notjudged_stretches(dialect: Dialect, job: ExportJob, read: Sequence[ProgramRows]) -> Iterator[str]:
     """What holds of the run but not of the files alone."""
     if job.frame.promise is Promise.PACED:
         yield "accelerations, and speeds and loads off the seams: the controllers choose their own"

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -21,9 +21,9 @@ from cellplan.checks.tools.between_checks import (
     with_between,
 )
 from cellplan.checks.tools.tracking import check_accuracy, check_closure
-from cellplan.geometry.arrays import Array, Flags
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.measures.tool_depth import task_depth, tool_reach
-from cellplan.measures.tool_errors import closure_accuracy, part_poses, task_accuracy
+from cellplan.measures.tool_errors import closure_accuracy, part_poses, relative_to_task_frame, task_accuracy
 from cellplan.model.cell.cell import Relation, stacked_positions
 from cellplan.model.motion.motion import Clock, Schedule, TaskSchedule
 from cellplan.model.report.report import Check, ClosureAccuracy, TaskAccuracy, ToolDepth
@@ -152,7 +152,7 @@ def path_findings(rows: PathRows) -> Iterator[str]:
     for check in _checks(rows):
         if not check.passed:
             yield check.message
-    yield from clearance_findings(rows)
+    yield from (_on_seam(rows, finding) for finding in clearance_findings(rows))
 
 
 def keeps_tools(rows: PathRows) -> bool:
@@ -259,8 +259,28 @@ def _at_rows(rows: PathRows, given: TaskSchedule, errors: TaskAccuracy) -> tuple
     return check_accuracy(replace(rows.schedule, times=rows.times), at_rows, task)
 
 
-def clearance_findings(rows: PathRows) -> Iterator[str]:
-    """The pairs of bodies that touch or are not proved to keep their distance, with what of it rounding takes."""
+class ClearanceFinding(NamedTuple):
+    """Two bodies that do not keep their distance."""
+
+    text: str  # what is said of them
+    robots: frozenset[str | None]  # which robots carry them
+    at_s: float  # when they come too near, in [s] from the beginning of the phase
+
+
+def clearance_findings(rows: PathRows) -> tuple[ClearanceFinding, ...]:
+    """The pairs of bodies that touch or are not proved to keep their distance, with what of it rounding takes.
+
+    The same motion is judged once.
+    """
+    tubes = (rows.tubes[name] for name in sorted(rows.tubes))
+    motion = motion_digest(
+        rows.times, rows.stacked, rows.times[rows.is_break], rows.off, rows.corners, *tubes, is_exact=True
+    )
+    return rows.shared.once(("clearance", rows.place, motion), lambda: tuple(_clearance_findings(rows)))
+
+
+def _clearance_findings(rows: PathRows) -> Iterator[ClearanceFinding]:
+    """See ``clearance_findings``."""
     scene = _demanding(rows)
     q = stacked_positions(scene.cell, rows.q)[rows.is_break]
     verdict = certify(scene, q, with_minimum=False)
@@ -291,7 +311,34 @@ def clearance_findings(rows: PathRows) -> Iterator[str]:
             wide = f", {MM * added:.2g} mm of it for {why}"
             cure = f"leave out less (--thin-mm, --thin-deg), so that rounding takes less, or {cure}"
         demanded = f"demanded {MM * pair.demand:.4g} mm{wide}"
-        yield f"clearance: {first} and {second} {proof}, at {at_s:.3f} s, {demanded}; {cure}"
+        text = f"clearance: {first} and {second} {proof}, at {at_s:.3f} s, {demanded}; {cure}"
+        bodies = (rows.scene.bodies[index] for index in (usual.first, usual.second))
+        yield ClearanceFinding(text, frozenset(body.robot for body in bodies), at_s)
+
+
+def _on_seam(rows: PathRows, finding: ClearanceFinding) -> str:
+    """What is said of two bodies, with task and place on its seam where a tool of theirs is on one."""
+    tasks = (scheduled.task for scheduled in rows.schedule.tasks if scheduled.task.robot in finding.robots)
+    places = ((task.name, place_on_seam(rows, task, finding.at_s)) for task in tasks)
+    return next((f"task '{name}', {place}{finding.text}" for name, place in places if place), finding.text)
+
+
+def place_on_seam(rows: PathRows, task: Task, at_s: float) -> str:
+    """Where on its seam a tool is at a time in [s] of the phase, for the beginning of a message; empty beside it."""
+    steps = line_steps(rows, task)
+    step = int(np.searchsorted(rows.times, at_s, side="right")) - 1
+    if not len(steps) or not steps[0] <= step <= steps[-1] + 1:
+        return ""
+    q = {name: positions[steps[0] : step + 1] for name, positions in rows.q.items()}
+    X_WP = part_poses(rows.scene.cell, rows.scene.chains, q)
+    X_PT = relative_to_task_frame(task, rows.scene.chains[task.robot].tool_poses(q[task.robot]), X_WP)
+    return f"{MM * np.linalg.norm(np.diff(X_PT[:, :3, 3], axis=0), axis=1).sum():.1f} mm along its seam: "
+
+
+def line_steps(rows: PathRows, task: Task) -> Indices:
+    """Steps in which the tool of a task is on a line or an arc; none where it moves by joints."""
+    tube = rows.tubes.get(task.robot)
+    return np.flatnonzero(np.zeros(0) if tube is None else np.any(tube > 0.0, axis=1))
 
 
 def _suspects(scene: Scene, q: Array, verdict: Bound) -> list[int]:

@@ -141,7 +141,10 @@ class _Choice:
         """Take back what does not keep its distance in every order between two marks."""
         for reach in (*REACHES[1:], 0.0):
             executed, run = replace(self._played, shares=self._shares()), self._shared.run
-            blocked = {place for place, _ in blocked_orders(run, orders, self.program, robot_corners(executed))}
+            known = self._shared.known_orders
+            blocked = {
+                place for place, _ in blocked_orders(run, orders, self.program, robot_corners(executed), known=known)
+            }
             if not blocked:
                 return
             for place in blocked:

@@ -38,6 +38,7 @@ CURE: Final = (
     "keep the times of the plan (--format stream or csv)"
 )
 Pair = tuple[str, str]
+KnownOrders = dict[tuple[bytes, ...], list[str]]  # findings between two marks, by the phase and all rows there
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,6 +114,7 @@ def certify_written(
     read: Sequence[ProgramRows],
     corners: Sequence[Mapping[str, Array]],
     *,
+    known: KnownOrders,
     progress: Progress = silent,
 ) -> Iterator[str]:
     """Certify every order once more on rows that were read: findings, one for each pair that is not clear.
@@ -124,25 +126,36 @@ def certify_written(
             if len(robot_rows.marks) != len(order.marks):
                 yield f"program of '{name}': expected {len(order.marks)} marks, got {len(robot_rows.marks)}"
                 return
-        yield from dict.fromkeys(finding for _, finding in blocked_orders(run, order, rows, off, progress=progress))
+        yield from dict.fromkeys(
+            finding for _, finding in blocked_orders(run, order, rows, off, known=known, progress=progress)
+        )
 
 
 def blocked_orders(
-    run: VerifiedRun, orders: Orders, rows: ProgramRows, corners: Mapping[str, Array], *, progress: Progress = silent
+    run: VerifiedRun,
+    orders: Orders,
+    rows: ProgramRows,
+    corners: Mapping[str, Array],
+    *,
+    known: KnownOrders,
+    progress: Progress = silent,
 ) -> Iterator[tuple[int, str]]:
     """Places of the stretches of a program in which a pair is not clear in every order, with what is not.
 
-    Robots that are not exported have the rows of the run. Corners are those of ``margins.robot_corners``.
+    Robots that are not exported have the rows of the run. Corners are those of ``margins.robot_corners``; what is known
+    of a run already is not worked out again, and what comes is added.
     """
     scenes = scenes_of(run)
     program = next(program for program in run_programs(run) if program.name == orders.program)
-    known: dict[tuple[bytes, ...], list[str]] = {}
     for count, stretch in enumerate(orders.stretches):
         progress(STAGE, count / len(orders.stretches))
         if not stretch.pairs:
             continue
         q, (off, tips) = _positions(run.cell, program, rows, count, stretch), _off(run.cell, rows, corners, count)
-        key = (str(stretch.place).encode(), *(values.tobytes() for values in (*q.values(), off, *tips.values())))
+        key = (
+            f"{orders.program} {stretch.place}".encode(),
+            *(values.tobytes() for values in (*q.values(), off, *tips.values())),
+        )
         if key not in known:  # or else a further cycle
             scene, regions = scenes[stretch.place], [_region(q, pair) for pair in stretch.pairs]
             if np.any(off):

@@ -320,11 +320,9 @@ def _require_lead(form: ProcessForm, seam: Seam, rows: RobotRows, ends: tuple[in
     lead = form.entry.lead(on=is_on_behind) if is_on is not is_on_behind else 0.0
     feed = np.inf if rows.feeds is None else float(rows.feeds[ends[1]])
     if lead and lead * feed >= length:
-        text = (
-            f"task '{seam.task}': expected {'on' if is_on_behind else 'off'}_lead_s below {length / feed:.3f}, which "
-        )
-        text += f"the motion to that point takes, {MM * length:.4g} mm at {MM * feed:.4g} mm/s, got {lead:g}"
-        raise NotVerifiedError([text])
+        key = "on_lead_s" if is_on_behind else "off_lead_s"
+        takes = f"the motion to that point takes, {MM * length:.4g} mm at {MM * feed:.4g} mm/s, got {lead:g}"
+        raise LineRefusedError(seam.task, f": expected {key} below {length / feed:.3f}, which {takes}")
 
 
 def _require_limits(robot: Robot, seam: Seam, q: Array, places: Array, *, feed: float, lengths: Array) -> None:

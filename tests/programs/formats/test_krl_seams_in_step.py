@@ -10,7 +10,7 @@ from builders.elbow_arm import tip
 from builders.seam_jobs import ROBOT
 from builders.seams_in_step import HELD, TABLE, job_beside, job_in_step, part_at, run_in_step, shapes, table
 
-from cellplan.errors import InputError, NotVerifiedError, raise_findings, refusals
+from cellplan.errors import InputError, LineRefusedError, NotVerifiedError, raise_findings, refusals
 from cellplan.geometry.transforms import inverse, pose_from, rotation_from_rpy
 from cellplan.model.report.exported import ExportJob, Moves, RobotRows
 from cellplan.programs.elements.escapes import with_register
@@ -215,5 +215,9 @@ def test_a_positioner_without_a_number_is_refused_where_it_moves_the_frame() -> 
 
     with pytest.raises(InputError, match=r"^robots\.table\.controller\.machine: expected its number in MACHINE_DEF"):
         KRL.render(replace(job, frame=frame))
+    with pytest.raises(LineRefusedError) as refused:  # for which tasks move by joints where moves are chosen
+        KRL.render(replace(job, frame=replace(frame, moves=Moves.AUTO)))
+    assert refused.value.task == "seam"
+    assert refused.value.reason.startswith("robots.table.controller.machine: expected its number")
     in_joints = replace(frame, moves=Moves.JOINTS)
     assert "MACHINE_DEF" not in "".join(KRL.render(replace(job, frame=in_joints)).values())

@@ -10,7 +10,7 @@ import pytest
 from builders import fanuc_jobs
 from builders.seam_jobs import KUKA_ZERO, run_of, seam_job
 
-from cellplan.errors import InputError, NotVerifiedError
+from cellplan.errors import InputError, LineRefusedError
 from cellplan.model.report.exported import ExportJob, RobotRows
 from cellplan.model.settings.task import ProcessEntry
 from cellplan.programs.elements.dialect import Dialect
@@ -209,7 +209,7 @@ def test_an_output_is_switched_ahead_within_its_motion_only(lead: float, is_kept
     if is_kept:
         executed_programs(job, KRL, [run_of(job)], read)
         return
-    with pytest.raises(NotVerifiedError) as error:
+    with pytest.raises(LineRefusedError) as error:
         executed_programs(job, KRL, [run_of(job)], read)
     assert str(error.value) == (
         "task 'seam': expected on_lead_s below 0.400, which the motion to that point takes, 100 mm at 250 mm/s, got "
@@ -219,7 +219,7 @@ def test_an_output_is_switched_ahead_within_its_motion_only(lead: float, is_kept
 
 def test_no_output_is_switched_ahead_where_robots_wait() -> None:
     """It would be on while they wait; off is switched before they do."""
-    with pytest.raises(NotVerifiedError, match=r"'seam': on_lead_s: .* as robots wait for one another there: leave"):
+    with pytest.raises(LineRefusedError, match=r"'seam': on_lead_s: .* as robots wait for one another there: leave"):
         KRL.render(changed(krl_job(), marks=(2,)))
     assert "DELAY=-50" in KRL.render(changed(krl_job(), marks=(5,)))["alpha.src"]
 
@@ -227,7 +227,7 @@ def test_no_output_is_switched_ahead_where_robots_wait() -> None:
 def test_no_motion_of_the_joints_switches_outputs_ahead() -> None:
     process = np.array([False, True, True, True, True, False, False, False])
 
-    with pytest.raises(NotVerifiedError, match=r"as no line or arc leads \(approach_mm\) there: leave it out"):
+    with pytest.raises(LineRefusedError, match=r"as no line or arc leads \(approach_mm\) there: leave it out"):
         KRL.render(changed(krl_job(), process=process, rounding=np.array([0, 0, 0.2, 0.2, 0, 0, 0, 0])))
 
 

@@ -50,7 +50,7 @@ def demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
         if frame.promise is Promise.PACED or is_in_step:
             placed = frame.robot(robot)
             yield partial(status_and_turn, placed, np.zeros((1, len(placed.model.joints))))
-            for grasp in frame.cell.part.held_by[:1]:
+            for grasp in frame.cell.part.held_by[:1] if frame.moves is Moves.LINEAR else ():
                 if grasp.robot in moved_robots(frame, robot)[1:]:
                     yield partial(machine_of, frame, grasp.robot)
 

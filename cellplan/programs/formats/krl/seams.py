@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import floor
 from typing import Final
 
+from cellplan.errors import InputError, LineRefusedError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame
@@ -82,7 +83,10 @@ def base_texts(frame: ExportFrame, robot: str, task: str) -> list[str]:
     part, holder = part_text(frame, robot, task), frame.station(robot, task).holder
     if holder is None:
         return [f"$BASE={part}"]
-    machine = f"MACHINE_DEF[{machine_of(frame, holder)}]"
+    try:
+        machine = f"MACHINE_DEF[{machine_of(frame, holder)}]"
+    except InputError as missing:
+        raise LineRefusedError(task, f": {missing}") from None
     return [f"$BASE=EK({machine}.ROOT,{machine}.MECH_TYPE,{part})", f"$ACT_EX_AX={external_axes(frame, robot)}"]
 
 
