@@ -8,9 +8,8 @@ import numpy as np
 from cellplan.checks.clearance.check import UNKNOWN, check_clearance
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.checks.clearance.skew import allowed_skew
-from cellplan.checks.clearance.standoff import check_standoffs
 from cellplan.checks.clearance.stops import check_stops, stop_report
-from cellplan.checks.clearance.tool_depth import check_depths
+from cellplan.checks.clearance.tool_depth import check_depths, check_standoffs
 from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
 from cellplan.checks.joints.demanded_feeds import check_feeds
 from cellplan.checks.joints.drift import check_joint_drift, repeatability

@@ -5,13 +5,8 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 
 
-def line_distances(first: Array, second: Array) -> Array:
-    """Smallest distances in [m] between segments with given ends, shape (M, 2, 3) each, points among them, (M,)."""
-    return np.linalg.norm(line_gaps(first, second), axis=1)
-
-
 def line_gaps(first: Array, second: Array) -> Array:
-    """From the nearest point of each first segment to that of the second, in [m], shape (M, 3); see `line_distances`.
+    """From the nearest point of each first segment, shape (M, 2, 3), to that of the second, in [m], shape (M, 3).
 
     The nearest points of two lines, or, where one of these lies beyond an end, of that end and the other segment.
     """

@@ -13,8 +13,8 @@ from cellplan.model.presented import Presented
 from cellplan.model.task.clocked_path import distinct
 from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
-from cellplan.planning.collocation.settling import settled, settling_joints
 from cellplan.planning.collocation.solver import Collocation, NullSpaceMotion, Precision, repeated
+from cellplan.planning.collocation.start_offset import settled, settling_joints
 from cellplan.planning.collocation.windows import Window, windows_between
 from cellplan.planning.tracking.given_path import GivenPath
 from cellplan.planning.tracking.motion_task import closures

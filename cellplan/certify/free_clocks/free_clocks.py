@@ -85,16 +85,12 @@ def certify_regions(
     return tuple(_RegionSearch(motion, region).run(with_minimum=with_minimum) for region in regions)
 
 
-def band(
-    times: Array, low: float, high: float, first: float = 0.0, last: float = np.inf, *, parts: int = BAND_PARTS
-) -> Array:
+def band(times: Array, low: float, high: float, *, parts: int = BAND_PARTS) -> Array:
     """Rectangles that cover all places of two programs of the same rows with low <= t_B - t_A <= high.
 
     Args:
         times: Times of the rows in [s], shape (N,).
         low: Smallest difference in [s].
-        first: Both times are no less than this.
-        last: Both times are no more than this.
 
     Returns:
         Rectangles, see ``ClockRegion``, shape (R, 4). They reach beyond the band by less than this share of its width
@@ -102,7 +98,7 @@ def band(
     """
     if not low <= high:
         raise ValueError(f"band: expected low <= high, got {low} and {high}")
-    begin, end = max(first, float(times[0])), min(last, float(times[-1]))
+    begin, end = max(0.0, float(times[0])), float(times[-1])
     begin_A, end_A = max(begin, begin - high), min(end, end - low)
     if begin_A > end_A:
         return np.zeros((0, 4))

@@ -1,20 +1,23 @@
-"""Depth of tools in the part against what tasks allow."""
+"""Depth of tools in the part, and distances of tool tips from it, against what tasks allow."""
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
+from cellplan.measures.standoff import UNSTATED
 from cellplan.measures.tool_depth import AXIS, DEPTH_TOL
 from cellplan.model.cell.cell import Cell
-from cellplan.model.report.report import Check, ToolDepth
+from cellplan.model.report.report import Check, Standoff, ToolDepth
 from cellplan.model.task.task import SampledPath, Task, TimedPath
 from cellplan.model.units import MM
 
 
 def check_depths(cell: Cell, depths: Sequence[ToolDepth]) -> list[Check]:
     """The depth of each task's tool against what the task, or else the cell, allows."""
-    return [_check(cell.task(depth.task), depth) for depth in depths]
+    return [_depth_check(cell.task(depth.task), depth) for depth in depths]
 
 
-def _check(task: Task, tool_depth: ToolDepth) -> Check:
+def _depth_check(task: Task, tool_depth: ToolDepth) -> Check:
     depth, limit = MM * tool_depth.depth, MM * tool_depth.limit
     passed = tool_depth.depth <= tool_depth.limit + DEPTH_TOL
     what = "its axis" if tool_depth.body == AXIS else f"{tool_depth.robot}/{tool_depth.body}"
@@ -40,3 +43,34 @@ def _cures(task: Task, depth: ToolDepth) -> Iterator[str]:
     else:
         yield "use a slimmer tool or another tool_axis: the surface is concave or inclined there"
     yield "allow it with tool_depth_mm if the process removes material"
+
+
+def check_standoffs(cell: Cell, standoffs: Sequence[Standoff]) -> list[Check]:
+    """Distances against what each task states; those of tasks that state nothing count for a process only."""
+    tasks = [(cell.task(standoff.task), standoff) for standoff in standoffs]
+    return [
+        _standoff_check(task, standoff)
+        for task, standoff in tasks
+        if task.standoff is not None or task.process is not None
+    ]
+
+
+def _standoff_check(task: Task, standoff: Standoff) -> Check:
+    low, high = task.standoff or (0.0, UNSTATED)
+    judged = standoff.worst_along if low > 0.0 else standoff.worst_nearest
+    when = " on its path" if standoff.at_s is None else f" at {standoff.at_s:.3f} s"
+    meets = not np.isinf(standoff.worst_along)
+    axis = f"{MM * standoff.worst_along:.1f} mm along its axis" if meets else "which its axis does not meet"
+    key = "no standoff_mm is stated" if task.standoff is None else f"standoff_mm = [{MM * low:g}, {MM * high:g}]"
+    where = f"the tip is {MM * standoff.worst_nearest:.1f} mm from the part{when}, {axis}"
+    message = f"standoff of task '{task.name}': {where}"
+    cure = (
+        f"allowed {MM * low:g} to {MM * high:g} mm and its tolerance ({key}): put the path on the part, state the "
+        "distance of the process, or name where the tool may leave the part (off_part: [run_in, run_out, cut])"
+    )
+    if standoff.excused:
+        names = ", ".join(f"{name} over {MM * length:.1f} mm" for name, length in standoff.excused.items())
+        message += f"; excused: {names}"
+    message = f"{message}; {cure}" if standoff.is_off else message
+    value, limit, at_s = float(min(MM * judged, 1e6)), MM * (low if judged < low else high), standoff.at_s
+    return Check("standoff", task.name, not standoff.is_off, message, value=value, limit=limit, unit="mm", at_s=at_s)

@@ -17,8 +17,7 @@ from cellplan.model.cell.mounting import Mount
 from cellplan.model.cell.rod import Rod
 from cellplan.model.origin import Origin
 from cellplan.model.presented import Presented
-from cellplan.model.robot.joint_sum import JointSum
-from cellplan.model.robot.robot import Body, JointLimits, RobotModel
+from cellplan.model.robot.robot import Body, JointLimits, JointSum, RobotModel
 from cellplan.model.settings.assign import AssignEntry
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry

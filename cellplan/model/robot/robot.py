@@ -9,14 +9,35 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.shapes import Solid
-from cellplan.geometry.transforms import Array, is_rigid
+from cellplan.geometry.transforms import is_rigid
 from cellplan.model.robot.controller import ControllerZero
 from cellplan.model.settings.robot import BodyAccuracyEntry, PayloadEntry, ReachEntry
 from cellplan.model.settings.units import Deg, Mm, in_si
 from cellplan.model.units import DisplayUnit, joint_unit
 
+ROUNDING = 1e-9  # [rad] of written angles
 BASE = -1  # index of the link that does not move, where a link is named by the joint that carries it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointSum:
+    """A range of the sum of some joint angles of a robot."""
+
+    joints: tuple[str, ...]  # names of the joints
+    columns: tuple[int, ...]  # their numbers
+    lower: float  # least sum in [rad]
+    upper: float  # largest sum in [rad]
+
+    def of(self, q: Array) -> Array:
+        """The sum at configurations of shape (..., n) in [rad], shape (...)."""
+        return q[..., list(self.columns)].sum(axis=-1)
+
+    def holds(self, q: Array) -> Flags:
+        """Whether configurations of shape (..., n) have it in its range, shape (...)."""
+        total = self.of(q)
+        return np.logical_and(total >= self.lower - ROUNDING, total <= self.upper + ROUNDING)
 
 
 class JointKind(StrEnum):

@@ -7,8 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.checks.clearance.mounting import CURES, check_mounting
-from cellplan.checks.clearance.standoff import check_standoffs
-from cellplan.checks.clearance.tool_depth import check_depths
+from cellplan.checks.clearance.tool_depth import check_depths, check_standoffs
 from cellplan.errors import StartNotFoundError
 from cellplan.measures.standoff import standoff_on
 from cellplan.measures.tool_depth import AXIS_COMPONENTS, path_depth

@@ -13,7 +13,7 @@ from cellplan.model.motion.motion import Schedule
 from cellplan.model.robot.robot import JointLimits
 from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
-from cellplan.planning.collocation.settling import settling_joints
+from cellplan.planning.collocation.start_offset import settling_joints
 from cellplan.planning.tracking.motion_task import closures
 from cellplan.planning.tracking.task_constraints import TaskConstraints
 from cellplan.scene.kinematics.batched import Placement

@@ -14,8 +14,8 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.planning.collocation.batch_tasks import Desired
-from cellplan.planning.collocation.settling import settled
 from cellplan.planning.collocation.solver import repeated
+from cellplan.planning.collocation.start_offset import settled
 from cellplan.scene.kinematics.batched import Placement
 from cellplan.search.kernel.job import Job, Layouts
 

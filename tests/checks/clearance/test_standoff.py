@@ -8,7 +8,7 @@ import pytest
 from builders.scene_builders import work
 from builders.tool_over_part import DOWN, PEN, tool_over_part
 
-from cellplan.checks.clearance.standoff import check_standoffs
+from cellplan.checks.clearance.tool_depth import check_standoffs
 from cellplan.geometry.shapes import Box, Solid
 from cellplan.geometry.transforms import pose
 from cellplan.measures.standoff import standoff_on, standoffs

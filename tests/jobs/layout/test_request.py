@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from cellplan import CellplanError, LayoutRequest
+from cellplan.cli.improve.layout_search import read_angle, read_length, read_misplacement, read_time
 from cellplan.cli.main import run
-from cellplan.cli.options.quantities import read_angle, read_length, read_misplacement, read_time
 from cellplan.jobs.layout.trials.searched import searched_cell, written_vary
 from cellplan.search.programs.objective import Objective
 

@@ -11,7 +11,7 @@ from cellplan.geometry.transforms import Array, pose
 from cellplan.jobs.base_map.prepared import PreparedMap
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
-from cellplan.search.base_map.contacts import KEYS, PlaceContact, contacts
+from cellplan.search.base_map.verdicts import KEYS, PlaceContact, contacts
 
 NODES = 9
 EXACT = 1e-4  # [m] distances of the engine

@@ -25,8 +25,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Grasp, Mode, MotionSettings, Obstacle, Part, Robot, Timing, Tool
 from cellplan.model.cell.rod import Holder, Rod, tool_body_name
 from cellplan.model.origin import Origin
-from cellplan.model.robot.joint_sum import JointSum
-from cellplan.model.robot.robot import BASE, Body, RobotModel, configuration_in_si
+from cellplan.model.robot.robot import BASE, Body, JointSum, RobotModel, configuration_in_si
 from cellplan.model.settings.units import Mm, in_si, si_or_none
 from cellplan.model.task.task import (
     CirclePath,
