@@ -5,10 +5,10 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Flags
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.line_spans import line_spans
 from cellplan.geometry.shapes import Solid, Sphere
-from cellplan.geometry.transforms import Array, inverse
+from cellplan.geometry.transforms import inverse
 from cellplan.measures.tool_errors import part_poses
 from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.motion.motion import Schedule

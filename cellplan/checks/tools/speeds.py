@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cellplan.geometry.arrays import first_peak
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, first_peak
 from cellplan.measures.tool_errors import relative_to_task_frame
 from cellplan.model.cell.acceleration import STEADY_FRACTION, ProcessSpeed
 from cellplan.model.cell.cell import Cell, Robot

@@ -11,8 +11,8 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.files.input.files import read_regular_file, utf8_text
 from cellplan.files.input.findings import Finding, did_you_mean, kind_of, listed, raise_findings, shown
-from cellplan.geometry.arrays import Flags
-from cellplan.geometry.transforms import Array, quaternion_to_rotation
+from cellplan.geometry.arrays import Array, Flags
+from cellplan.geometry.transforms import quaternion_to_rotation
 from cellplan.model.task.task import SampledPath, TimedPath
 
 TIME: Final = "t_s"

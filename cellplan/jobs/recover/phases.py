@@ -7,8 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Flags
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.jobs.recover.state import RunPlaces, StoppedState
 from cellplan.model.cell.cell import Cell
 from cellplan.scene.scene import Scene

@@ -8,8 +8,7 @@ import numpy as np
 from cellplan.certify.certify import certify
 from cellplan.certify.growth import certify_growth, rows_too_near
 from cellplan.errors import TransferNotFoundError
-from cellplan.geometry.arrays import Flags
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.jobs.recover.phases import SAME, RecoveryKind, RecoveryPhase, joints_of, moving
 from cellplan.jobs.recover.state import RunPlaces, StoppedState
 from cellplan.model.progress import Progress

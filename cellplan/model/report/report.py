@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.acceleration import UNKNOWN_ACCELERATIONS, MotionAccelerations
@@ -329,11 +328,7 @@ class Report(Presented):
         return f"<Report of '{self.cell}', {self.phase or self.mode}, {self.cycle_time:g} s, {verdict([self])}>"
 
 
-if TYPE_CHECKING:
-    from cellplan.model.report.report import Report
-
-
-def verdict(reports: Sequence["Report"]) -> str:
+def verdict(reports: Sequence[Report]) -> str:
     """Checks that passed and the smallest clearance, or checks that failed and the first of them."""
     checks = [check for report in reports for check in report.checks]
     failed = [check.message for check in checks if not check.passed]

@@ -5,8 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Indices
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent

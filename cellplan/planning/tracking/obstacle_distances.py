@@ -5,8 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Flags, Indices
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.report.report import ClearanceClass
 from cellplan.scene.near import NearPairs, NearTable, WatchedPairs, near_pairs
 from cellplan.scene.pairs import Rule

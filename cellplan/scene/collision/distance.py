@@ -5,9 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Indices
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.shapes import Mesh, support_point
-from cellplan.geometry.transforms import Array
 from cellplan.scene.collision.bodies import BodyPoses
 from cellplan.scene.collision.engine import Engine
 from cellplan.scene.collision.overlap.containment import is_inside

@@ -10,13 +10,12 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Flags, Indices
+from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.mesh.counts import ray_winding
 from cellplan.geometry.mesh.rays import along_curve, ray_hits
 from cellplan.geometry.mesh.tessellation import halved, tessellate
 from cellplan.geometry.mesh.touching import has_several_solids, outer_surface
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere
-from cellplan.geometry.transforms import Array
 from cellplan.scene.collision.bodies import BodyPoses, CollisionBody, fine_segments, prepare
 from cellplan.scene.collision.engine import Engine, nearest_triangle
 
