@@ -18,6 +18,12 @@ from cellplan.scene.collision.hull_supports import HullSupports
 from cellplan.scene.kinematics.link_forest import WORLD, LinkForest
 from cellplan.scene.pairs import Rule
 
+if TYPE_CHECKING:
+    from cellplan.scene.scene import Scene
+
+TINY: Final = 1e-12  # [m] lines nearer than that cross
+CLEAR_OF_TIP: Final = 1e-3  # [m] by which the hull of a cut tool keeps clear of the tip where it stands for the tool
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BodyTable:
@@ -77,13 +83,6 @@ class BodyTable:
 def placed_points(poses: BodyPoses, bodies: Indices, samples: Indices, points: Array) -> Array:
     """Points in the world, shape (M, 3), of bodies at samples, shape (M,), from those in their own frames in [m]."""
     return (poses.R[bodies, samples] @ points[..., None])[..., 0] + poses.p[bodies, samples]
-
-
-if TYPE_CHECKING:
-    from cellplan.scene.scene import Scene
-
-TINY: Final = 1e-12  # [m] lines nearer than that cross
-CLEAR_OF_TIP: Final = 1e-3  # [m] by which the hull of a cut tool keeps clear of the tip where it stands for the tool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

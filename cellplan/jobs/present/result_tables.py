@@ -263,7 +263,7 @@ def _limits(joint: Joint, start: float | None) -> Row:
         "jerk_limit": joint.jerk,
         "start": start,
     }
-    return {name: None if value is None else number(scale * value) for name, value in values.items()}
+    return {name: number(value, scale) for name, value in values.items()}
 
 
 def _task_row(task: Task) -> Row:
@@ -274,7 +274,7 @@ def _task_row(task: Task) -> Row:
         "relative_to": str(task.relative_to),
         "start_s": number(task.start),
         "duration_s": number(task.duration),
-        "feed_mm_s": None if task.feed is None else number(MM * task.feed),
+        "feed_mm_s": number(task.feed, MM),
         "repeat": task.repeat,
         "position_tolerance_mm": number(task.tolerance.position_mm),
         "orientation_tolerance_deg": number(task.tolerance.orientation_deg),

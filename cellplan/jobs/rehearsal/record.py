@@ -126,10 +126,10 @@ def _iso_record(figures: IsoFigures) -> Record:
 
 def _path_record(path: PathFigures) -> Record:
     return {
-        "AT_p_mm": _mm(path.AT_p),
+        "AT_p_mm": number(path.AT_p, 1e3),
         "AT_p_at_s": number(path.AT_p_at_s),
         **_angles_record("AT", path.AT_abc),
-        "RT_p_mm": _mm(path.RT_p),
+        "RT_p_mm": number(path.RT_p, 1e3),
         "RT_p_at_s": number(path.RT_p_at_s),
         **_angles_record("RT", path.RT_abc),
     }
@@ -138,9 +138,9 @@ def _path_record(path: PathFigures) -> Record:
 def _pose_record(pose: PoseFigures) -> Record:
     return {
         "at_s": number(pose.at_s),
-        "AP_p_mm": _mm(pose.AP_p),
+        "AP_p_mm": number(pose.AP_p, 1e3),
         **_angles_record("AP", pose.AP_abc),
-        "RP_l_mm": _mm(pose.RP_l),
+        "RP_l_mm": number(pose.RP_l, 1e3),
         **_angles_record("RP", pose.RP_abc),
     }
 
@@ -150,10 +150,6 @@ def _angles_record(name: str, angles: tuple[float, float, float] | None) -> Reco
         f"{name}_{letter}_deg": None if angles is None else number(math.degrees(angles[index]))
         for index, letter in enumerate(ABC)
     }
-
-
-def _mm(length: float | None) -> float | None:
-    return None if length is None else number(1e3 * length)
 
 
 def _run_record(cell: Cell, run: RunRehearsal) -> Record:
@@ -188,7 +184,7 @@ def _correction_record(correction: Correction) -> Record:
         "rounds": [
             {
                 "round": made.number,
-                "max_position_error_mm": {task: _mm(value) for task, value in made.position.items()},
+                "max_position_error_mm": {task: number(value, 1e3) for task, value in made.position.items()},
                 "max_orientation_error_deg": {
                     task: number(math.degrees(value)) for task, value in made.orientation.items()
                 },

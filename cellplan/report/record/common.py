@@ -66,9 +66,11 @@ class ExtremeRecord(TypedDict):
     at_s: Annotated[Number, "its time"]
 
 
-def number(value: float | None) -> Number:
-    """The value with ``SIGNIFICANT`` digits and without -0; None if it is not finite."""
-    return None if value is None or not math.isfinite(value) else float(f"{value:.{SIGNIFICANT}g}") + 0.0
+def number(value: float | None, scale: float = 1.0) -> Number:
+    """The scaled value with ``SIGNIFICANT`` digits and without -0; None if it is not finite."""
+    return (
+        None if value is None or not math.isfinite(scale * value) else float(f"{scale * value:.{SIGNIFICANT}g}") + 0.0
+    )
 
 
 def entry_record(entry: Entry, without: Collection[str] = ()) -> Any:

@@ -105,15 +105,13 @@ def smallest_minimum(minima: Mapping[ClearanceClass, ClearanceMinimum]) -> Clear
 
 def _minimum_record(minimum: ClearanceMinimum, accuracies: tuple[float | None, float | None] | None) -> MinimumRecord:
     return {
-        "minimum_mm": None if minimum.minimum is None else number(MM * minimum.minimum),
+        "minimum_mm": number(minimum.minimum, MM),
         "pair": list(minimum.pair) if minimum.pair else None,
         "at_s": number(minimum.at_s),
         "certified": minimum.certified,
         "exact": minimum.certified and minimum.exact,
         "points_mm": [[number(MM * x) for x in point] for point in minimum.points] if minimum.points else None,
-        "accuracies_mm": None
-        if accuracies is None
-        else [None if value is None else number(MM * value) for value in accuracies],
+        "accuracies_mm": None if accuracies is None else [number(value, MM) for value in accuracies],
     }
 
 

@@ -138,12 +138,12 @@ def _acceleration_record(use: JointAcceleration | None) -> JointAccelerationReco
     return {
         "peak_acceleration": number(scale * use.peak),
         "peak_acceleration_at_s": number(use.peak_at_s),
-        "acceleration_limit": None if use.limit is None else number(scale * use.limit),
+        "acceleration_limit": number(use.limit, scale),
         "acceleration_limit_source": str(use.source),
         "acceleration_ratio": number(use.ratio),
         "peak_jerk": number(scale * use.peak_jerk),
         "peak_jerk_at_s": number(use.peak_jerk_at_s),
-        "jerk_limit": None if use.jerk_limit is None else number(scale * use.jerk_limit),
+        "jerk_limit": number(use.jerk_limit, scale),
         "jerk_window_ms": number(1e3 * use.window),
     }
 

@@ -99,7 +99,7 @@ def _pair_record(pair: PairSkew) -> PairSkewRecord:
         "robots": [pair.first, pair.second],
         "allowed_ms": number(MS * pair.allowed),
         "or_more": pair.allowed >= MOST_SKEW,
-        "stated_ms": None if pair.stated is None else number(MS * pair.stated),
+        "stated_ms": number(pair.stated, MS),
         "limits": [_limit_record(limit) for limit in pair.limits],
     }
 
@@ -110,7 +110,7 @@ def _limit_record(limit: AllowedSkew) -> SkewLimitRecord:
         "skew_ms": number(MS * limit.skew),
         "or_more": limit.skew >= MOST_SKEW,
         "subject": limit.subject,
-        "at_s": None if limit.at_s is None else number(limit.at_s),
+        "at_s": number(limit.at_s),
     }
 
 
@@ -121,8 +121,8 @@ def _tool_record(tool: ToolSkew) -> ToolSkewRecord:
         "error_per_ms_mm": number(tool.speed),  # m/s are mm/ms
         "by_position_ms": number(MS * tool.by_position),
         "by_orientation_ms": number(MS * tool.by_orientation),
-        "at_s": None if tool.at_s is None else number(tool.at_s),
-        "position_error_at_stated_mm": None if tool.position is None else number(MM * tool.position),
-        "orientation_error_at_stated_deg": None if tool.orientation is None else number(DEG * tool.orientation),
-        "shortest_cycle_s": None if tool.shortest_cycle is None else number(tool.shortest_cycle),
+        "at_s": number(tool.at_s),
+        "position_error_at_stated_mm": number(tool.position, MM),
+        "orientation_error_at_stated_deg": number(tool.orientation, DEG),
+        "shortest_cycle_s": number(tool.shortest_cycle),
     }

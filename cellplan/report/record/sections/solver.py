@@ -221,7 +221,7 @@ def _resolution_record(motion: Motion) -> ResolutionRecord | None:
         "nodes": resolution.nodes,
         "sweeps": resolution.sweeps,
         "solves": resolution.solves,
-        "error_between_nodes_mm": None if resolution.error_between is None else number(MM * resolution.error_between),
+        "error_between_nodes_mm": number(resolution.error_between, MM),
         "euler_from_s": number(resolution.euler_from),
         "lost": None if resolution.lost is None else _lost_record(resolution.lost),
     }

@@ -156,7 +156,7 @@ def _task_record(
         "tolerance": entry_record(task.tolerance.filled, without=() if accuracy.between else BETWEEN_ROWS),
         "axes": [AXES[index] for index in task.axes],
         "path_length_mm": number(MM * accuracy.path_length),
-        "path_bulge_mm": None if accuracy.path_bulge is None else number(MM * accuracy.path_bulge),
+        "path_bulge_mm": number(accuracy.path_bulge, MM),
         "cycles": task.repeat,
         "start_s": number(accuracy.start_s),
         "end_s": number(accuracy.end_s),

@@ -64,13 +64,11 @@ def between_record(between: BetweenRows | None) -> BetweenRowsRecord:
     return {
         "max_position_error_between_rows_mm": number(MM * position.largest),
         "max_position_error_between_rows_at_s": number(position.at_s),
-        "position_error_between_rows_bound_mm": None if position.bound is None else number(MM * position.bound),
+        "position_error_between_rows_bound_mm": number(position.bound, MM),
         "position_error_between_rows_by": position.proof,
         "max_orientation_error_between_rows_deg": number(DEG * orientation.largest),
         "max_orientation_error_between_rows_at_s": number(orientation.at_s),
-        "orientation_error_between_rows_bound_deg": None
-        if orientation.bound is None
-        else number(DEG * orientation.bound),
+        "orientation_error_between_rows_bound_deg": number(orientation.bound, DEG),
         "orientation_error_between_rows_by": orientation.proof,
     }
 
