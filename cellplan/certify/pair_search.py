@@ -108,7 +108,7 @@ class Search(ABC):
             if self._travel(step) <= RESOLUTION or not self.state.may_cut:
                 bounds.is_given_up[step] = True
                 if bounds.low[step] < self.state.needed:
-                    self.state.note_unproved(self._time(step))
+                    self.state.unproved.append(self._time(step))
                 return
             self.state.count_cut()
             fine = self._fine[step] = self._finer(step)
@@ -181,7 +181,7 @@ class SolidSearch(Search):
         reading = self._readings.get(sample)
         if reading is None:
             reading = self._measured(sample, goal)
-            self.state.count_reading()
+            self.state.spare_readings += not self.state.is_verdict_open
             self.take(sample, reading, goal)
         return reading
 

@@ -58,10 +58,6 @@ class PairState:
         self.cuts += 1
         self.spare_cuts += not self.is_verdict_open
 
-    def count_reading(self) -> None:
-        """Count one more reading, where it is for the smallest distance."""
-        self.spare_readings += not self.is_verdict_open
-
     def note_distance(self, distance: float, at: float) -> None:
         """Record a measured distance in [m] and its time."""
         if distance < self.distance:
@@ -70,10 +66,6 @@ class PairState:
     def note_touches(self, times: Iterable[float]) -> None:
         """Record times at which the bodies touch."""
         self.touches.extend(times)
-
-    def note_unproved(self, at: float) -> None:
-        """Record a step that cannot be cut any more; it counts where the necessary distance is not proved in it."""
-        self.unproved.append(at)
 
 
 class StepBounds:

@@ -71,11 +71,6 @@ def file_links(
     return {title: links for title, links in groups.items() if links}
 
 
-def view_link(phase: str | None) -> str:
-    """Address of the 3-D page of a run, seen from the page of a phase, or from the page in the run folder."""
-    return f"{_up(phase)}{VIEW_PAGE}"
-
-
 def _up(phase: str | None) -> str:
     """The way from the folder of a page to the run folder, to be put before a name."""
     return "../" if phase is not None else ""
@@ -105,7 +100,7 @@ def report_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes], **pic
     """
     several = not is_of_phase(record)
     parts: dict[str, object] = {"errors": phase_errors(record)} if several else _phase_parts(record, cell)
-    view, begins = view_link(record.get("phase")), phase_begins(record)
+    view, begins = f"{_up(record.get('phase'))}{VIEW_PAGE}", phase_begins(record)
     parts |= {
         "several": several,
         "figures": key_figures(record),
