@@ -9,6 +9,7 @@ from cellplan.model.cell.cell import Cell, Grasp, Robot
 from cellplan.model.task.task import Task
 from cellplan.report.record.common import Record, number
 from cellplan.report.record.sections.joints import joint_record, limits_text
+from cellplan.report.text.method import counted
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 TOOL_AXIS = ("across_tool_1", "across_tool_2")  # what free spin leaves of the three turns
@@ -118,7 +119,7 @@ def structure_lines(record: Record) -> list[str]:
     counts = [(len(record["robots"]), "robot"), (joints, "joint"), (len(record["tasks"]), "task")]
     holders = ", ".join(record["part"]["held_by"])
     return [
-        f"{record['cell']}: {', '.join(_count(*count) for count in counts)}, mode {record['mode']}",
+        f"{record['cell']}: {', '.join(counted(*count) for count in counts)}, mode {record['mode']}",
         f"the part is held by {holders}" if holders else "the part is fixed in the world",
         *_robot_lines(record["robots"]),
         *_task_lines(record["tasks"]),
@@ -127,10 +128,6 @@ def structure_lines(record: Record) -> list[str]:
         *_circuit_lines(record),
         *(line for matrix in record["matrices"] for line in _matrix_lines(matrix)),
     ]
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _robot_lines(robots: Iterable[Record]) -> Iterator[str]:
@@ -175,7 +172,7 @@ def _graph_lines(graph: Record, closures: list[str]) -> Iterator[str]:
     virtual = sum(joint["virtual"] for joint in graph["joints"])
     yield ""
     yield f"graph: {v} links (vertices), {e} joints (edges): {e - virtual} real, {virtual} virtual ({where})"
-    yield f"  l = e - v + 1 = {e} - {v} + 1 = {_count(circuits, 'independent circuit')}"
+    yield f"  l = e - v + 1 = {e} - {v} + 1 = {counted(circuits, 'independent circuit')}"
     chains: dict[str, list[Record]] = {}
     for joint in graph["joints"]:
         chains.setdefault(_owner(joint, closures), []).append(joint)
@@ -224,7 +221,7 @@ def _matrix_lines(matrix: Record) -> Iterator[str]:
     rows, columns = matrix["rows"], matrix["columns"]
     of = "cooperation Jacobian" + (f" of the run {matrix['run']}" if matrix["run"] else "")
     yield ""
-    yield f"{of}: {_count(rows, 'row')}, {_count(columns, 'column')}"
+    yield f"{of}: {counted(rows, 'row')}, {counted(columns, 'column')}"
     task_width = _width(matrix["row_blocks"])
     for robots in _groups(matrix["column_blocks"], left=task_width + 6):
         widths = [max(len(robot), 5) + GAP for robot in robots]
@@ -253,10 +250,10 @@ def _rank_lines(matrix: Record) -> Iterator[str]:
         if rank < rows:
             yield (
                 f"  only {rank} of {rows} rows are independent there: "
-                f"{_count(rows - rank, 'direction')} in which the tools cannot move as required"
+                f"{counted(rows - rank, 'direction')} in which the tools cannot move as required"
             )
     if rank is None and columns < rows:
-        yield f"  overconstrained: {_count(rows, 'row')} for {_count(columns, 'column')}"
+        yield f"  overconstrained: {counted(rows, 'row')} for {counted(columns, 'column')}"
 
 
 def _groups(column_blocks: Record, *, left: int) -> Iterator[list[str]]:

@@ -1,5 +1,6 @@
 """Euler's method: from sample to sample of the clock, with the pose error fed back."""
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -44,17 +45,12 @@ def integrate(
         NoSolutionError: The method found no step.
     """
     cell = problem.cell
+    key = next((f"robots.{robot.name}.path" for robot in cell.robots if robot.path is not None), "motion")
     advance = method_named(cell.solver.method)(problem)
     q = np.tile(start, (last + 1, 1))
     iterations, slack = np.zeros(last), np.zeros(last)
     for k in range(first, last):
-        try:
-            step = advance(k, q[k])
-            refuse_long_step(cell, q[k], step)
-        except NoSolutionError as error:
-            singular = singular_words(problem, k, q[k])
-            key = next((f"robots.{robot.name}.path" for robot in cell.robots if robot.path is not None), "motion")
-            raise type(error)(f"{cell.origin.at(key)}: at {problem.times[k]:.3f} s {error}{singular}") from None
+        step = step_from(problem, advance, k, q[k], key=key)
         q[k + 1] = problem.given.placed(k + 1, step.q)
         iterations[k], slack[k] = step.iterations, step.slack
         if k % PROGRESS_EVERY == 0:
@@ -62,7 +58,20 @@ def integrate(
     return Motion(times=problem.times[: last + 1], q=q, iterations=iterations, slack=slack)
 
 
-def refuse_long_step(cell: Cell, q: Array, step: StepResult) -> None:
+def step_from(
+    problem: TrackingProblem, advance: Callable[[int, Array], StepResult], k: int, q: Array, *, key: str = "motion"
+) -> StepResult:
+    """The step from a configuration, shape (nq,), at sample k; errors say when, and name a key of the cell file."""
+    try:
+        step = advance(k, q)
+        _refuse_long_step(problem.cell, q, step)
+    except NoSolutionError as error:
+        at = f"{problem.cell.origin.at(key)}: at {problem.times[k]:.3f} s"
+        raise type(error)(f"{at} {error}{singular_words(problem, k, q)}") from None
+    return step
+
+
+def _refuse_long_step(cell: Cell, q: Array, step: StepResult) -> None:
     """Stop when a step is not finite, or a joint would turn by half a turn in it, where the first order ends."""
     moves = np.abs(step.q - q)
     if not float(np.max(moves, initial=0.0)) < LARGEST_STEP:  # also for what is not a number

@@ -10,17 +10,15 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_exp, rotation_vector
 from cellplan.model.motion.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.settings.solver import SecondaryEntry
 from cellplan.model.task.task import Task
-from cellplan.planning.euler.integrate import integrate_schedule, refuse_long_step
+from cellplan.planning.euler.integrate import integrate_schedule, step_from
 from cellplan.planning.methods import method_named
 from cellplan.planning.tracking.cooperation_jacobian import pose_errors
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import TrackingProblem
-from cellplan.planning.tracking.singularity import singular_words
 
 SETTLING_STEPS: Final = 60  # Newton steps from one start posture to the next; a few are enough away from singularities
 START_MEASUREMENTS: Final = 6  # times that standing tools are measured and put right before a pass begins
@@ -115,13 +113,7 @@ def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
         for place, (scheduled, X_seen) in enumerate(zip(desired.tasks, measure(q[k : k + 1]), strict=True)):
             seen, model = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
             references[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=model)
-        try:
-            step = advance(k, q[k])
-            refuse_long_step(cell, q[k], step)
-        except NoSolutionError as error:
-            singular = singular_words(problem, k, q[k])
-            raise type(error)(f"{cell.origin.at('motion')}: at {desired.times[k]:.3f} s {error}{singular}") from None
-        q[k + 1] = step.q
+        q[k + 1] = step_from(problem, advance, k, q[k]).q
     return Motion(times=desired.times, q=q)
 
 

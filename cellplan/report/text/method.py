@@ -67,7 +67,7 @@ def _integration_lines(record: Record, step: str) -> Iterator[str]:
     if resolution["panels"]:
         error = resolution["error_between_nodes_mm"]
         within = "" if error is None else f", error between nodes below {_plain(_above(error))} mm"
-        counts = f"{_counted(resolution['nodes'], 'node')} in {_counted(resolution['panels'], 'panel')}"
+        counts = f"{counted(resolution['nodes'], 'node')} in {counted(resolution['panels'], 'panel')}"
         yield f"Accurate mode: {counts}{within}."
     if resolution["euler_from_s"] is not None:
         lost = resolution.get("lost")
@@ -83,7 +83,8 @@ def no_accurate_mode(method: MethodName) -> str:
     return f"No accurate mode: {method} {METHODS[method].steps_because}."
 
 
-def _counted(count: int, what: str) -> str:
+def counted(count: int, what: str) -> str:
+    """A count with its noun."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
