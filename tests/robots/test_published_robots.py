@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from body_accuracy import compare, distance_to, mesh_points, skin_points
 
-from cellplan.files.robots import bundled
+from cellplan.files.robots import joint_table
 from cellplan.files.robots.joint_table import read_robot_table
 from cellplan.files.robots.urdf.load import read_urdf
 from cellplan.geometry.transforms import Array, inverse, pose, pose_from, rotation_about, transform_points
@@ -120,7 +120,7 @@ PUBLISHED = {
 }
 
 
-load_bundled = cache(bundled.load_bundled)
+load_bundled = cache(joint_table.load_bundled)
 
 
 def chain(model: RobotModel) -> ScrewChain:

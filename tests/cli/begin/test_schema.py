@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from cellplan.cli.main import run
-from cellplan.files.robots import bundled
+from cellplan.files.robots.joint_table import FOLDER, bundled_names
 
 
 def test_the_schema_is_one_json_object_with_the_keys_of_a_cell(capsys: pytest.CaptureFixture[str]) -> None:
@@ -33,9 +33,7 @@ def test_one_schema_is_printed_at_a_time(capsys: pytest.CaptureFixture[str]) -> 
 def test_a_bundled_table_conforms_to_the_schema_of_robot_tables(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["schema", "--robot"]) == 0
 
-    jsonschema.validate(
-        yaml.safe_load((bundled.FOLDER / "kuka_kr6.yaml").read_bytes()), json.loads(capsys.readouterr().out)
-    )
+    jsonschema.validate(yaml.safe_load((FOLDER / "kuka_kr6.yaml").read_bytes()), json.loads(capsys.readouterr().out))
 
 
 def test_editors_are_offered_the_bundled_robots(capsys: pytest.CaptureFixture[str]) -> None:
@@ -43,5 +41,5 @@ def test_editors_are_offered_the_bundled_robots(capsys: pytest.CaptureFixture[st
 
     model = json.loads(capsys.readouterr().out)["$defs"]["RobotEntry"]["properties"]["model"]
     offered, permitted = model["anyOf"]
-    assert tuple(offered["enum"]) == bundled.bundled_names()
+    assert tuple(offered["enum"]) == bundled_names()
     assert permitted == {"type": "string"}  # any path may stand there

@@ -64,6 +64,10 @@ class DHChain:
             frames.append(frames[-1] @ row.pose(position))
         return np.stack(frames)
 
+    def flange_pose(self, q: Array) -> Array:
+        """Flange in B, shape (4, 4)."""
+        return self.frames(q)[-1] @ self.X_DF
+
 
 def dh_chain(model: RobotModel) -> DHChain:
     """Place Denavit-Hartenberg frames along the joint axes of a data sheet ([Ribeiro2010]_ App. A).
@@ -140,7 +144,7 @@ def dh_cooperation_jacobian(cell: Cell, q: Array) -> Array:
 def _arm(robot: Robot, q: Array) -> _Arm:
     """One robot at its own configuration."""
     chain = dh_chain(robot.model)
-    return _Arm(robot.X_WB[:3, :3], robot.X_WB @ (chain.frames(q)[-1] @ chain.X_DF), *geometric_jacobian(chain, q))
+    return _Arm(robot.X_WB[:3, :3], robot.X_WB @ chain.flange_pose(q), *geometric_jacobian(chain, q))
 
 
 def _positioner_block(arm: _Arm, X_WP: Array, *, r_PT: Array, r_FP: Array) -> Array:
