@@ -1,4 +1,4 @@
-"""Starts of motions: postures brought to their paths, and tools beside their paths that come to them smoothly."""
+"""Starts of motions: the tools of many cells brought to their paths, or coming to them smoothly from beside them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
