@@ -54,19 +54,24 @@ def check(options: CheckOptions) -> Result:
 
 def _checked(options: CheckOptions, follow: "Callable[[Cell], None]", progress: Listener) -> Result:
     """Read and check a cell; ``follow`` is called with the cell as soon as it is read."""
-    from cellplan.cli.next_steps import after_check
     from cellplan.files.cell.load import load_cell, with_names
-    from cellplan.jobs.check import check as check_cell
-    from cellplan.jobs.check import check_lines
-    from cellplan.programs.export.refusals import require_settings
     from cellplan.runs.overrides import with_overrides
 
+    formats = list(dict.fromkeys(name.strip() for text in options.formats for name in text.split(",")))
+    if formats:
+        from cellplan.programs.export.refusals import require_formats, require_settings
+
+        require_formats(formats)
     given = load_cell(options.cell, allow_dirs=options.allow_dirs)
     follow(given)
     named = given if options.controllers is None else with_names(given, options.controllers)
     changed = with_overrides(named, options.settings)
-    formats = list(dict.fromkeys(name.strip() for text in options.formats for name in text.split(",")))
-    require_settings(changed, formats)
+    if formats:
+        require_settings(changed, formats)
+    from cellplan.cli.next_steps import after_check
+    from cellplan.jobs.check import check as check_cell
+    from cellplan.jobs.check import check_lines
+
     result = check_cell(changed, progress=progress)
     status = ExitStatus.PASSED if result.passed else ExitStatus.CHECK_FAILED
     record = _record(result) | ({"for": formats} if formats else {})

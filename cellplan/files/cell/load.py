@@ -29,7 +29,7 @@ from cellplan.files.cell.changes import changed, plain_values
 from cellplan.files.cell.layout.build_layout import read_layout
 from cellplan.files.cell.names import with_stated_names
 from cellplan.files.cell.open_tasks import open_task_findings, open_tasks, unknown_robot_findings, with_first_robots
-from cellplan.files.cell.referenced_files import Sources
+from cellplan.files.cell.referenced_files import Sources, Urdfs
 from cellplan.files.cell.rules.path_rules import path_findings
 from cellplan.files.cell.rules.program_rules import posture_findings, program_findings, with_stand_offs
 from cellplan.files.cell.rules.rules import Targets, rule_findings, target_findings
@@ -77,6 +77,7 @@ class CellFile:
     allow_dirs: tuple[Path, ...]  # further folders that these files may lie in
     parts: Mapping[str, object] = field(default_factory=dict)  # of the cell as built from it, by attribute
     robots: Mapping[str, Sequence[str]] = field(default_factory=dict)  # that may do a task which is open to several
+    urdfs: Urdfs = field(default_factory=dict)  # robots of URDFs as they were read
 
     @property
     def written(self) -> Mapping[str, Any]:
@@ -93,16 +94,19 @@ class CellFile:
                 )
         document = changed(self.document, values)
         changes = {address: value for address, value in self.changes.items() if address not in values}
-        return _read(replace(self, document=document, changes=changes | plain_values(values)))
+        return _read(replace(self, document=document, changes=changes | plain_values(values), urdfs={}))
 
 
-def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path | None = None) -> Cell:
+def load_cell(
+    path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path | None = None, like: Cell | None = None
+) -> Cell:
     """Read a cell file and everything it names.
 
     Args:
         allow_dirs: Folders, beside the cell's own and those that the user allows for every cell, that the files it
             names may lie in.
         folder: The folder that its names start from; None for the one it lies in.
+        like: A cell that was read just before: what it read of the same URDFs is not read again.
 
     Raises:
         InvalidFileError: Everything that is wrong with the cell and the files it names, one located line each.
@@ -111,7 +115,9 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
     path = Path(path)
     document = read_yaml(path, file=str(path))
     allowed = tuple(Path(folder) for folder in allow_dirs)
-    return _read(CellFile(document=document, name=path.name, folder=folder or path.parent, allow_dirs=allowed))
+    source = CellFile(document=document, name=path.name, folder=folder or path.parent, allow_dirs=allowed)
+    known = None if like is None else like.origin.source
+    return _read(replace(source, urdfs=known.urdfs) if isinstance(known, CellFile) else source)
 
 
 def load_open_cell(
@@ -166,7 +172,7 @@ def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:
     findings += rule_findings(valid, document)
     findings += task_rule_findings(valid, document, source.robots)
     allowed = (*source.allow_dirs, *user_folders(source.folder))
-    sources = Sources(document, AllowedFolders(folder=source.folder, allowed=allowed))
+    sources = Sources(document, AllowedFolders(folder=source.folder, allowed=allowed), source.urdfs)
     sources.inputs[source.name] = document.digest
     valid, models = apply_srdfs(valid, _models(valid, document, sources), sources, document)
     sound = dict(models)

@@ -32,6 +32,7 @@ if TYPE_CHECKING:  # read only for a cell that names such a file
     from cellplan.files.robots.urdf.load import UrdfOptions, UrdfRobot
     from cellplan.files.robots.urdf.srdf import Srdf
 
+Urdfs = dict[Hashable, "UrdfRobot"]  # by what was read of which file
 URDF_SUFFIXES = frozenset({".urdf", XACRO_SUFFIX})
 TABLE_SUFFIXES = frozenset({".yaml", ".yml"})
 
@@ -39,12 +40,12 @@ TABLE_SUFFIXES = frozenset({".yaml", ".yml"})
 class Sources:
     """Reads what a cell names and gathers what is wrong with it."""
 
-    def __init__(self, document: YamlDocument, folders: AllowedFolders) -> None:
-        """Keep the folders and the document that findings refer to."""
+    def __init__(self, document: YamlDocument, folders: AllowedFolders, urdfs: Urdfs) -> None:
+        """Keep the folders, the document that findings refer to, and robots of URDFs as they were read."""
         self._document = document
         self._folders = folders
         self._meshes: dict[tuple[str, str | None], Mesh | None] = {}
-        self._urdfs: dict[Hashable, UrdfRobot] = {}
+        self._urdfs = urdfs
         self.inputs: dict[str, str] = {}  # SHA-256 of every file that was read, by the path as written
         self.findings: list[Finding] = []  # about the names in the cell file
         self.errors: list[InputError] = []  # about the files themselves
@@ -250,9 +251,7 @@ def _only_for_urdf(name: str, entry: RobotEntry, document: YamlDocument) -> Iter
             yield document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
 
 
-def _read_urdf(
-    known: "dict[Hashable, UrdfRobot]", entry: RobotEntry, place: Path, *, options: "UrdfOptions"
-) -> "UrdfRobot":
+def _read_urdf(known: Urdfs, entry: RobotEntry, place: Path, *, options: "UrdfOptions") -> "UrdfRobot":
     """Robot of a URDF; robots that say the same of the same file share one."""
     from cellplan.files.robots.urdf.load import load_urdf
 

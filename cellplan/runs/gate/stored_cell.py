@@ -71,7 +71,7 @@ def _with_file(stored: StoredRun, cell: Path, allow_dirs: Sequence[Path]) -> tup
     stale = _stale(stored, now, where=f"'{cell}'", cell=cell)
     if set(stale) - {manifest.cell_file}:
         _refuse(stored, stale)
-    resolved = _resolved(stored, folder=cell.parent, allow_dirs=allow_dirs)
+    resolved = _resolved(stored, folder=cell.parent, allow_dirs=allow_dirs, like=original)
     seeds = _seeds(stored) if stale else None
     differences = [
         difference
@@ -151,10 +151,10 @@ def _refuse(stored: StoredRun, stale: Mapping[str, str], details: Iterable[str] 
         raise InvalidFileError([*map(InputError, lines)])
 
 
-def _resolved(stored: StoredRun, *, folder: Path, allow_dirs: Sequence[Path]) -> Cell:
+def _resolved(stored: StoredRun, *, folder: Path, allow_dirs: Sequence[Path], like: Cell | None = None) -> Cell:
     """The resolved copy, which must be the file that the manifest names and refer to its inputs."""
     manifest = stored.manifest
-    cell = load_cell(stored.folder / CELL, allow_dirs=allow_dirs, folder=folder)
+    cell = load_cell(stored.folder / CELL, allow_dirs=allow_dirs, folder=folder, like=like)
     digests = dict(cell.inputs)
     if digests.pop(CELL) != manifest.files[CELL].digest:
         raise InputError(f"{stored.folder / CELL}: changed while it was read")
