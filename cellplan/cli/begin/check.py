@@ -57,11 +57,12 @@ def _checked(options: CheckOptions, follow: "Callable[[Cell], None]", progress: 
     from cellplan.files.cell.load import load_cell, with_names
     from cellplan.runs.overrides import with_overrides
 
-    formats = list(dict.fromkeys(name.strip() for text in options.formats for name in text.split(",")))
-    if formats:
-        from cellplan.programs.export.refusals import require_formats, require_settings
+    formats: list[str] = []
+    if options.formats:
+        from cellplan.programs.export.exporters import formats_for
+        from cellplan.programs.export.refusals import require_settings
 
-        require_formats(formats)
+        formats = formats_for(options.formats)
     given = load_cell(options.cell, allow_dirs=options.allow_dirs)
     follow(given)
     named = given if options.controllers is None else with_names(given, options.controllers)

@@ -67,12 +67,13 @@ def recover(options: RecoverOptions) -> Result:
     too. Exit status: 0 written, 1 a check fails, 2 bad input, or a run that is changed or stale, 3 no recovery was
     found (the reason is written, no tables), 4 internal error.
     """
-    from cellplan.jobs.recover.programs import recovery_frame, recovery_programs
-    from cellplan.jobs.recover.recover import recover as recovered
-    from cellplan.jobs.recover.result import default_folder, recovery_lines, refuse_unless_recoverable, write_recovery
-    from cellplan.jobs.recover.state import refuse_state
-    from cellplan.jobs.view.write import write_view_of_blocked
-    from cellplan.report.page.render import VIEW_PAGE
+    from cellplan.jobs.recover.refusals import (
+        default_folder,
+        recovery_frame,
+        refuse_state,
+        refuse_unless_recoverable,
+    )
+    from cellplan.programs.export.exporters import formats_for
     from cellplan.runs.gate.open_gate import open_gate
 
     at, frozen, keep = options.at, frozen_times(options.frozen), options.keep
@@ -80,7 +81,7 @@ def recover(options: RecoverOptions) -> Result:
     limits = speed_limits(options.speed, options.tcp_speed)
     folder = options.output or default_folder(options.run)
     refuse_unless_recoverable(folder, options.run)
-    formats = list(dict.fromkeys(name.strip() for text in options.formats for name in text.split(",")))
+    formats = formats_for(options.formats)
 
     def refuse(read: "ReadRun") -> None:
         refuse_state(read.cell, read.motion, at=at, frozen=frozen, keep=keep)
@@ -89,6 +90,12 @@ def recover(options: RecoverOptions) -> Result:
 
     with progress_listener(quiet=options.quiet) as progress:
         run = open_gate(options.run, **shared.sources(options), refuse=refuse, progress=progress)
+        from cellplan.jobs.recover.programs import recovery_programs
+        from cellplan.jobs.recover.recover import recover as recovered
+        from cellplan.jobs.recover.result import recovery_lines, write_recovery
+        from cellplan.jobs.view.write import write_view_of_blocked
+        from cellplan.report.page.render import VIEW_PAGE
+
         transfer = run.cell.program.transfer.changed(**limits)
         recovery = recovered(run, at=at, frozen=frozen, keep=keep, transfer=transfer, progress=progress)
         programs = {form: recovery_programs(run, recovery, form) for form in formats if recovery.succeeded}

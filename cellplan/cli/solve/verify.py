@@ -85,10 +85,8 @@ def _verified_run(options: VerifyOptions) -> Result:
 
 def _verified_programs(options: VerifyOptions) -> Result:
     """Verify a folder of exported programs against the run that they were made from."""
-    from cellplan.jobs.recover.escape import verify_escape
     from cellplan.programs.export.exporters import require_format
     from cellplan.programs.export.stored import read_stored_export, refuse_other_run, run_of_export
-    from cellplan.programs.export.verify_export import verify_export
     from cellplan.runs.gate.open_gate import open_gate
 
     stored = read_stored_export(options.run)
@@ -97,6 +95,9 @@ def _verified_programs(options: VerifyOptions) -> Result:
     with progress_listener(quiet=options.quiet) as progress:
         other = partial(refuse_other_run, stored)
         run = open_gate(source, **shared.sources(options), refuse=other, progress=progress)
+        from cellplan.jobs.recover.escape import verify_escape
+        from cellplan.programs.export.verify_export import verify_export
+
         judge = verify_escape if "escape" in stored.record else verify_export
         outcome = judge(stored, run, progress=progress)
     remarks = [*run.remarks, *outcome.remarks]

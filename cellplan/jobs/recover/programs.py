@@ -8,25 +8,24 @@ from typing import Final
 import numpy as np
 
 from cellplan.cache import without_cache
-from cellplan.errors import InputError, NotVerifiedError, raise_findings
+from cellplan.errors import NotVerifiedError
 from cellplan.geometry.transforms import Array
 from cellplan.jobs.recover.legs import Leg, Track, leg_findings, recovery_legs, recovery_rows
 from cellplan.jobs.recover.recover import Recovery
+from cellplan.jobs.recover.refusals import recovery_frame
 from cellplan.jobs.recover.state import RunPlaces
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.exported import ExportFrame, ExportJob, Interpolation, ProgramRows, Promise, RobotRows
-from cellplan.model.report.verified_run import AnyRun, VerifiedRun
+from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.handshake import speakers
 from cellplan.programs.elements.joints import in_step
 from cellplan.programs.elements.timed_rows import cycle_of
-from cellplan.programs.export.choice import Choice, exported_robots
-from cellplan.programs.export.exporters import require_format
 from cellplan.programs.export.notes import READ_BACK
-from cellplan.programs.export.refusals import is_at_cycle, unmet_demands
+from cellplan.programs.export.refusals import is_at_cycle
 from cellplan.programs.judgement.compare_rows import other_rows
-from cellplan.programs.promises.promises import controllers_of, waits
+from cellplan.programs.promises.promises import waits
 from cellplan.programs.rows.interpolant import HermiteRows, resting, row_velocities
 from cellplan.programs.rows.resample import lead_time, resampled
 from cellplan.programs.rows.thin import bends
@@ -76,22 +75,6 @@ class RecoveryPrograms:
         return findings
 
 
-def recovery_frame(run: AnyRun, form: str) -> ExportFrame:
-    """What a reader may know of the programs of a recovery; call it early.
-
-    ``InputError`` with all that the cell does not state, or where there is no such format.
-    """
-    require_format(form, option="--for")
-    if form not in DIALECTS:
-        raise InputError(f"--for: expected a format of programs of single robots, got {form}, a table of all robots")
-    cell, dialect = run.cell, DIALECTS[form]
-    robots = exported_robots(cell, dialect, ())
-    promise = _promise(cell, dialect, robots)
-    frame = ExportFrame(cell=cell, robots=robots, programs=(None,), promise=promise)
-    raise_findings(unmet_demands(run, dialect, frame, Choice()))
-    return frame
-
-
 def recovery_programs(run: VerifiedRun, recovery: Recovery, form: str) -> RecoveryPrograms:
     """A recovery that was found, in one format.
 
@@ -120,13 +103,6 @@ def recovery_programs(run: VerifiedRun, recovery: Recovery, form: str) -> Recove
     if findings:
         raise NotVerifiedError([f"recovery as {form}: {finding}" for finding in findings])
     return programs
-
-
-def _promise(cell: Cell, dialect: Dialect, robots: Sequence[str]) -> Promise:
-    """What can be promised of a recovery: robots of one controller go in step, or else they wait for one another."""
-    in_step = len(robots) == len(cell.robots) > 1 and len(set(controllers_of(cell, robots).values())) == 1
-    order = (Promise.SYNCHRONISED,) if in_step else ()
-    return next(promise for promise in (*order, Promise.SEQUENCE_ONLY, Promise.TIMED) if promise in dialect.promises)
 
 
 def _notes(run: VerifiedRun, recovery: Recovery, frame: ExportFrame, by_hand: Sequence[str]) -> Iterator[str]:

@@ -8,11 +8,10 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.certify.growth import ComingApart
-from cellplan.errors import InputError
 from cellplan.files.input.files import digest
 from cellplan.files.input.findings import listed
-from cellplan.files.run.content import PROGRAMS, RECOVER, RECOVERY
-from cellplan.files.run.folder import RunFolder, refuse_unless_replaceable
+from cellplan.files.run.content import PROGRAMS, RECOVERY
+from cellplan.files.run.folder import RunFolder
 from cellplan.files.run.joint_tables import program_digest, table_body
 from cellplan.geometry.transforms import Array
 from cellplan.jobs.recover.judge import Nearest, TimedPhase
@@ -230,17 +229,3 @@ def _files(recovery: Recovery, programs: Programs) -> dict[str, str]:
         f"{PROGRAMS}/{form}/{path}": text for form, one in programs.items() for path, text in one.files.items()
     }
     return {CLOCK: clock_text(recovery), **tables, **of_programs}
-
-
-def default_folder(run: Path) -> Path:
-    """Where the recovery of a run goes."""
-    return run / RECOVER
-
-
-def refuse_unless_recoverable(folder: Path, run: Path) -> None:
-    """Refuse the run itself, and a folder that must not be written, before any work."""
-    if folder.resolve() == run.resolve():
-        raise InputError(f"{folder}: expected a folder of its own for the recovery, got the run's")
-    if folder.exists() and folder.is_dir() and any(folder.iterdir()) and not (folder / RECOVERY).is_file():
-        raise InputError(f"{folder}: expected an empty folder or a recovery, got something else")
-    refuse_unless_replaceable(folder)

@@ -8,10 +8,9 @@ import numpy as np
 
 from cellplan.certify.growth import scene_at_stop
 from cellplan.certify.run_pairs import scene_of_rows, scene_of_run
-from cellplan.errors import InputError
-from cellplan.files.input.findings import listed
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array
+from cellplan.jobs.recover.refusals import END, refuse_state, standing_times
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.motion.motion import Motion
 from cellplan.model.motion.plan import Phase
@@ -26,7 +25,6 @@ from cellplan.scene.scene import Scene
 
 TIP: Final = "tool tip"  # no body of a file has a name with a space
 TIP_RADIUS: Final = 1e-5  # [m]
-END: Final = 1e-9  # [s] by which a time may lie beyond the end: the rounding of a decimal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -141,7 +139,7 @@ def stopped_state(
     """
     cell, motion = places.cell, places.motion
     refuse_state(cell, motion, at=at, frozen=frozen, keep=keep)
-    times = _standing_times(cell, at, frozen)
+    times = standing_times(cell, at, frozen)
     q = np.concatenate([_at(motion, times[robot.name])[cell.columns(robot.name)] for robot in cell.robots])
     held_at = next((times[name] for name in cell.positioners), at)
     return StoppedState(
@@ -152,43 +150,6 @@ def stopped_state(
         place=places.at(at),
         lying=places.lying_at(places.at(held_at)),
     )
-
-
-def refuse_state(cell: Cell, motion: Motion, *, at: float, frozen: Mapping[str, float], keep: Collection[str]) -> None:
-    """Refuse what ``stopped_state`` cannot make, and robots that hold the part at different times; call it early."""
-    names = [robot.name for robot in cell.robots]
-    _require_time(motion, at, "--at")
-    for option, given in (("--frozen", frozen), ("--keep", keep)):
-        for name in given:
-            if name not in names:
-                raise InputError(f"{option}: expected the name of a robot ({listed(names)}), got '{name}'")
-    for name, time in frozen.items():
-        _require_time(motion, time, f"--frozen {name}")
-    if cell.motion.locked:
-        raise InputError("--at: expected a run in which no joint fails, got one with motion.locked_joints")
-    times = _standing_times(cell, at, frozen)
-    holders = {name: times[name] for name in cell.positioners}
-    if len(set(holders.values())) > 1:
-        stated = listed(f"{name}@{time:g}" for name, time in holders.items())
-        raise InputError(f"--frozen: expected one time for all robots that hold the part together, got {stated}")
-
-
-def _standing_times(cell: Cell, at: float, frozen: Mapping[str, float]) -> dict[str, float]:
-    """Time of the program in [s] at which each robot stands, by its name."""
-    return {robot.name: float(frozen.get(robot.name, at)) for robot in cell.robots}
-
-
-def _require_time(motion: Motion, time: float, option: str) -> None:
-    """Refuse a time at which the program has no rows."""
-    end = float(motion.times[-1])
-    if not -END <= time <= end + END:
-        raise InputError(f"{option}: expected a time of the program, 0 to {end:g} s, got {time:g}")
-    for row, name in motion.gaps.items():
-        if motion.times[row - 1] < time < motion.times[row]:
-            raise InputError(
-                f"{option}: expected a time at which the program has rows, got {time:g}, in the motion '{name}' that "
-                "is not part of it"
-            )
 
 
 def _at(motion: Motion, time: float) -> Array:

@@ -61,6 +61,14 @@ def refuse_choice(form: str, choice: Choice) -> None:
         raise InputError(f"--format: expected no choice of robots, rows or targets with {form}, a table of all robots")
 
 
+def formats_for(texts: Sequence[str]) -> list[str]:
+    """Formats in texts of ``--for`` such as ``rapid,krl``, each once."""
+    names = list(dict.fromkeys(name.strip() for text in texts for name in text.split(",")))
+    for name in names:
+        require_format(name, option="--for")
+    return names
+
+
 def chosen_formats(formats: Sequence[str]) -> dict[str, bool]:
     """Formats that are meant, ``all`` for every one, and whether each was asked for by its name; at least one."""
     if not formats:

@@ -16,7 +16,7 @@ from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.handshake import require_signals
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import Choice, exported_robots, refuse_unknown_robots
-from cellplan.programs.export.exporters import EXPORTERS, exporter_of, refuse_choice, require_format
+from cellplan.programs.export.exporters import EXPORTERS, exporter_of, refuse_choice
 from cellplan.programs.promises.promises import require_promise
 from cellplan.programs.promises.run_programs import run_programs
 from cellplan.programs.promises.stations import stations
@@ -94,7 +94,6 @@ def require_settings(cell: Cell, formats: Iterable[str]) -> None:
     missing: list[InputError] = []
     has_process = any(task.process is not None for task in cell.tasks)
     for form in formats:
-        require_format(form, option="--for")
         dialect = EXPORTERS[form]
         if isinstance(dialect, Dialect):
             choice = Choice(moves=Moves.LINEAR) if has_process and Moves.LINEAR in dialect.moves else EVERYTHING

@@ -11,7 +11,7 @@ from builders.seam_jobs import seam_job
 from cellplan import open_gate
 from cellplan.cli.main import run as run_command
 from cellplan.errors import InputError, NotVerifiedError
-from cellplan.jobs.recover.state import refuse_state
+from cellplan.jobs.recover.refusals import refuse_state
 from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import ReadRun
 from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry, KindName, RobotControlEntry
