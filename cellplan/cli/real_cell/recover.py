@@ -3,8 +3,9 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cellplan.cli.options import shared
 from cellplan.cli.options.completion import one_of
@@ -13,9 +14,6 @@ from cellplan.cli.options.request import option
 from cellplan.cli.terminal.output import Result, notes
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
-
-if TYPE_CHECKING:
-    from cellplan.model.report.verified_run import ReadRun
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,12 +65,7 @@ def recover(options: RecoverOptions) -> Result:
     too. Exit status: 0 written, 1 a check fails, 2 bad input, or a run that is changed or stale, 3 no recovery was
     found (the reason is written, no tables), 4 internal error.
     """
-    from cellplan.jobs.recover.refusals import (
-        default_folder,
-        recovery_frame,
-        refuse_state,
-        refuse_unless_recoverable,
-    )
+    from cellplan.jobs.recover.refusals import default_folder, refuse_recovery, refuse_unless_recoverable
     from cellplan.programs.export.exporters import formats_for
     from cellplan.runs.gate.open_gate import open_gate
 
@@ -82,12 +75,7 @@ def recover(options: RecoverOptions) -> Result:
     folder = options.output or default_folder(options.run)
     refuse_unless_recoverable(folder, options.run)
     formats = formats_for(options.formats)
-
-    def refuse(read: "ReadRun") -> None:
-        refuse_state(read.cell, read.motion, at=at, frozen=frozen, keep=keep)
-        for form in formats:
-            recovery_frame(read, form)
-
+    refuse = partial(refuse_recovery, at=at, frozen=frozen, keep=keep, formats=formats)
     with progress_listener(quiet=options.quiet) as progress:
         run = open_gate(options.run, **shared.sources(options), refuse=refuse, progress=progress)
         from cellplan.jobs.recover.programs import recovery_programs

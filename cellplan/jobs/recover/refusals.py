@@ -1,6 +1,6 @@
 """Refusals: what speaks against a recovery as the files of a run say already, before anything is computed."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -11,7 +11,7 @@ from cellplan.files.run.folder import refuse_unless_replaceable
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Motion
 from cellplan.model.report.exported import ExportFrame, Promise
-from cellplan.model.report.verified_run import AnyRun
+from cellplan.model.report.verified_run import AnyRun, ReadRun
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.export.choice import Choice, exported_robots
@@ -33,6 +33,15 @@ def refuse_unless_recoverable(folder: Path, run: Path) -> None:
     if folder.exists() and folder.is_dir() and any(folder.iterdir()) and not (folder / RECOVERY).is_file():
         raise InputError(f"{folder}: expected an empty folder or a recovery, got something else")
     refuse_unless_replaceable(folder)
+
+
+def refuse_recovery(
+    run: ReadRun, *, at: float, frozen: Mapping[str, float], keep: Collection[str], formats: Iterable[str]
+) -> None:
+    """Refuse a recovery, and its programs in some formats, of which the files of a run say that they cannot be."""
+    refuse_state(run.cell, run.motion, at=at, frozen=frozen, keep=keep)
+    for form in formats:
+        recovery_frame(run, form)
 
 
 def refuse_state(cell: Cell, motion: Motion, *, at: float, frozen: Mapping[str, float], keep: Collection[str]) -> None:

@@ -1,5 +1,8 @@
 """What the files of a run say against an export is said at once, all of it, before anything is verified."""
 
+import re
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -12,6 +15,7 @@ from cellplan import open_gate
 from cellplan.cli.main import run as run_command
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.jobs.recover.refusals import refuse_state
+from cellplan.model.motion.motion import Motion
 from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import ReadRun
 from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry, KindName, RobotControlEntry
@@ -82,6 +86,26 @@ def test_every_robot_without_a_controller_is_named(read: ReadRun) -> None:
     assert str(refusal.value).splitlines() == [
         f"robots.{name}.controller: expected the controller that plays val3, got none" for name in NAMES
     ]
+
+
+def test_what_needs_no_rows_is_refused_without_them_and_without_engines(
+    sound: Path, read: ReadRun, tmp_path: Path
+) -> None:
+    def rows() -> Motion:
+        raise InputError("the rows were read")
+
+    with pytest.raises(InputError) as refusal:
+        refusing("csv", Choice(robots=("lefty",)))(replace(read, rows=rows))
+    words = ["export", str(sound / "run"), "--format", "csv", "--robot", "lefty", "-o", str(tmp_path / "csv"), "-q"]
+    words += ["--cell", str(sound / "cell" / "small.yaml")]
+    command = [sys.executable, "-X", "importtime", "-m", "cellplan", *words]
+    refused = subprocess.run(command, capture_output=True, text=True, check=False)
+    loaded = set(re.findall(r"^import time:.*\| +([\w.]+)$", refused.stderr, flags=re.MULTILINE))
+
+    assert refused.returncode == 2
+    assert refused.stderr.endswith(f"{refusal.value}\n")
+    assert "cellplan.programs.formats.csv" in loaded
+    assert loaded.isdisjoint({"pinocchio", "fcl", "coal", "jinja2", "cellplan.programs.formats.rapid.writer"})
 
 
 def test_all_that_a_stream_needs_is_said_at_once(read: ReadRun) -> None:
