@@ -164,7 +164,7 @@ def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:
     """The cell of a document, after all rules were applied to it and to the files that it names."""
     document, file = with_first_robots(source.document), source.document.file
     valid, findings = read_valid_entries(document)
-    findings += [*document.findings, *open_task_findings(source.document), *known]
+    findings += [*document.findings, *(() if source.robots else open_task_findings(source.document)), *known]
     if valid.is_too_large:
         raise_findings(file, findings)
     findings += program_findings(valid, document)

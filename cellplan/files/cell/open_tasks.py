@@ -1,6 +1,6 @@
 """Open tasks: tasks that several robots may do, one of which an assignment chooses."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -56,8 +56,9 @@ def open_task_findings(document: YamlDocument) -> Iterator[Finding]:
         kind = "a robot" if isinstance(value, tuple) or value == ANY else "an available robot"
         alike.setdefault((kind, shown(value)), []).append(name)
     for (kind, value), (name, *others) in alike.items():
-        more = f", as in {len(others)} more task{'s' * (len(others) > 1)}" if others else ""
-        words = f"expected the name of {kind}, got {value}{more}: cellplan assign chooses who does an open task"
+        words = (
+            f"expected the name of {kind}, got {value}{_more(others)}: cellplan assign chooses who does an open task"
+        )
         yield document.finding(("tasks", name, "robot"), words)
 
 
@@ -69,7 +70,11 @@ def unknown_robot_findings(document: YamlDocument) -> Iterator[Finding]:
             if robot not in known:
                 words = f"expected one of {listed(known)}, got {shown(robot)}{did_you_mean(robot, known)}"
                 yield document.finding(("tasks", name, "robot", index), words)
-        if not robots:
-            yield document.finding(
-                ("tasks", name, "robot"), "expected an available robot that does not hold the part, got none"
-            )
+    if nobody := [name for name, robots in open_tasks(document.root).items() if not robots]:
+        words = f"expected an available robot that does not hold the part, got none{_more(nobody[1:])}"
+        yield document.finding(("tasks", nobody[0], "robot"), words)
+
+
+def _more(others: Sequence[str]) -> str:
+    """How many tasks are as the one that is named."""
+    return f", as in {len(others)} more task{'s' * (len(others) > 1)}" if others else ""

@@ -26,6 +26,7 @@ from cellplan.search.assign.schedules.order import SequencedBlocks
 
 ROUNDS: Final = 4  # programs that are solved until one passes
 NEARLY: Final = 1.05  # [-] of the cycle of the program: so long are those of its alternatives at most
+MOST_OTHERS: Final = 5  # alternatives that are told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -210,7 +211,7 @@ def alternatives_to(best: SequencedBlocks, others: Iterable[SequencedBlocks]) ->
     for other in sorted(others, key=lambda it: it.steps):
         if other.steps <= NEARLY * best.steps:
             different.setdefault(other.schedule.identity, other)
-    return tuple(different.values())[1:]
+    return tuple(different.values())[1 : 1 + MOST_OTHERS]
 
 
 def _solved(cell: Cell, progress: Progress) -> Solution | str:

@@ -23,7 +23,7 @@ from cellplan.search.assign.problem.rules import TaskRules, tasks_before
 from cellplan.search.assign.problem.stations import choose_stations
 from cellplan.search.assign.problem.table import Key, ModeSearch, ModeTable, TaskMode
 from cellplan.search.assign.schedules.blocks import BlockAnswer
-from cellplan.search.assign.schedules.cover import best_blocks
+from cellplan.search.assign.schedules.cover import best_blocks, bound_of_blocks
 from cellplan.search.assign.schedules.greedy import greedy_schedule, improved
 from cellplan.search.assign.schedules.order import Refusal, SequencedBlocks, Sequencer
 from cellplan.search.assign.schedules.refined import Refinement
@@ -129,24 +129,21 @@ class AssignmentSearch:
         answer = BlockAnswer(schedule=None, bound=None, is_proved=False)
         if is_installed():
             answer = best_blocks(instance, least=least, effort=self._effort, hint=exchanged)
-        schedules = [exchanged] if answer.schedule is None else [exchanged, answer.schedule]
-        certified = sorted((certifier.best(sequencer, it) for it in schedules), key=lambda it: it.steps)
-        others = sorted(map(sequencer.ordered, answer.others), key=lambda it: it.steps)
-        best, refined = certified[0], instance
-        for other in others:
-            best = certifier.settle(sequencer, other.schedule, below=best)
+        schedules = [it for it in (answer.schedule, *answer.others, exchanged) if it is not None]
+        others = sorted(map(sequencer.ordered, schedules), key=lambda it: it.steps)
+        best, refined = certifier.best(sequencer, others), instance
         if is_refined:
             best, refined = self._refinement.shortened(best, sequencer)
         bound = answer.bound
         if bound is not None and refined is not instance:
-            finer = best_blocks(refined, least=least_transfer(refined), effort=self._effort, hint=best.schedule)
-            bound = min(bound, finer.bound or 0)
+            least, hint = least_transfer(refined), best.schedule
+            bound = min(bound, bound_of_blocks(refined, least=least, effort=self._effort, hint=hint) or 0)
         return PlannedBlocks(
             sequenced=best,
             bound=bound,
             is_proved=answer.is_proved,
             greedy=nearest,
-            others=(*certified, *others),
+            others=tuple(others),
             examined=certifier.examined,
             refused=len(sequencer.refusals),
         )

@@ -71,6 +71,29 @@ def test_a_list_with_an_unknown_robot_is_refused(tmp_path: Path) -> None:
         load_open_cell(tmp_path / "cell.yaml")
 
 
+def test_tasks_without_an_available_robot_are_refused_in_one_line(tmp_path: Path) -> None:
+    text = OPEN.read_text().replace("home_deg:", "available: false\n    home_deg:")
+    (tmp_path / "cell.yaml").write_text(text)
+
+    with pytest.raises(InputError) as refused:
+        load_open_cell(tmp_path / "cell.yaml")
+    assert str(refused.value).endswith(
+        "tasks.top_1.robot: expected an available robot that does not hold the part, got none, as in 7 more tasks"
+    )
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_circle_of_tasks_after_one_another_is_refused_when_the_file_is_read(tmp_path: Path) -> None:
+    text = OPEN.read_text()
+    for task, before in (("top_1", "top_2"), ("top_2", "edge_1"), ("edge_1", "top_1")):
+        text = text.replace(f"  {task}:\n", f"  {task}:\n    after: [{before}]\n", 1)
+    (tmp_path / "cell.yaml").write_text(text)
+
+    with pytest.raises(InputError, match=r"after: expected rules that some order keeps, .* 'edge_1'") as refused:
+        load_open_cell(tmp_path / "cell.yaml")
+    assert len(str(refused.value).splitlines()) == 1
+
+
 ODD = ("5", "~", "{}", "[[1]]", "[{robot: {}}]")
 
 

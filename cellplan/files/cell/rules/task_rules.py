@@ -94,7 +94,10 @@ def _circles(valid: ValidEntries, program: ProgramEntry, document: YamlDocument)
     groups = ([name for _, name in group] for group in _groups(program, "together"))
     first = {name: " with ".join(names) for names in groups for name in names}
     edges: list[Edge] = [
-        (name, other, None) for name, task in valid.tasks.items() for other in task.preceding if other in valid.tasks
+        (name, other, ("tasks", name, "after"))
+        for name, task in valid.tasks.items()
+        for other in task.preceding
+        if other in valid.tasks
     ]
     for robot in valid.robots.values():
         edges += [(later, one, None) for one, later in pairwise(it for it in robot.order or () if it in valid.tasks)]
@@ -112,9 +115,10 @@ def _circles(valid: ValidEntries, program: ProgramEntry, document: YamlDocument)
         while circle[-1] not in circle[:-1]:
             circle.append(next(name for name in before[circle[-1]] if name in left))
         circle = circle[circle.index(circle[-1]) :]
-        rules = (before[later][one] for later, one in pairwise(circle))
-        path = next((place for place in rules if place is not None), ("program", "together") if first else None)
-        if path is not None:  # a circle of other keys is named where blocks are made
+        rules = [before[later][one] for later, one in pairwise(circle)]
+        path = ("program", "together") if first else None if None in rules or len(rules) == 1 else rules[0]
+        path = next((place for place in rules if place and place[0] == "program"), path)
+        if path is not None:  # one of given orders is named where blocks are made
             words = " before ".join(f"'{name}'" for name in reversed(circle))
             text = f"expected rules that some order keeps, with after and the orders of the robots, got {words}"
             yield document.finding(path, text)

@@ -143,12 +143,15 @@ class Instance:
 
     def station_steps(self, first: int | None, second: int | None) -> int:
         """Whole steps that the holder takes between two stations; None stands for its home."""
-        holder = self.stations.holder
-        if holder is None:
-            return 0
-        a = self.homes[holder] if first is None else self.stations.left[first]
-        b = self.homes[holder] if second is None else self.stations.q[second]
-        return int(self.transfer_steps(holder, a, b))
+        return 0 if self.stations.holder is None else self._part_steps[first, second]
+
+    @cached_property
+    def _part_steps(self) -> dict[tuple[int | None, int | None], int]:
+        """Those between all stations in use."""
+        holder, used = str(self.stations.holder), list(self.used)
+        leaves, comes = (np.stack([self.homes[holder], *it[used]]) for it in (self.stations.left, self.stations.q))
+        steps = self.transfer_steps(holder, leaves[:, None], comes[None])
+        return dict(zip(product((None, *used), repeat=2), steps.ravel().tolist(), strict=True))
 
 
 def with_rules(instance: Instance, rules: TaskRules) -> Instance:

@@ -21,7 +21,6 @@ from cellplan.search.assign.schedules.rule_rows import add_rest_rows, add_rule_r
 from cellplan.search.assign.schedules.schedule import BlockSchedule, Choice, in_order
 from cellplan.search.assign.schedules.solver import Solved, new_model
 
-MOST_OTHERS: Final = 3  # schedules that are nearly as good
 HORIZON: Final = 10_000_000  # [steps] no cycle is longer
 
 
@@ -51,7 +50,7 @@ def solve_blocks(instance: Instance, *, least: int, effort: float, hint: BlockSc
         schedule=next(iter(different), None),
         bound=solved.bound,
         is_proved=solved.is_proved,
-        others=tuple(different[1 : 1 + MOST_OTHERS]),
+        others=tuple(different[1:]),
     )
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from cellplan.geometry.arrays import Indices
 from cellplan.search.assign.problem.instance import Instance
 from cellplan.search.assign.problem.table import Key
-from cellplan.search.assign.schedules.blocks import MOST_OTHERS, BlockAnswer, solve_blocks
+from cellplan.search.assign.schedules.blocks import BlockAnswer, solve_blocks
 from cellplan.search.assign.schedules.schedule import BlockSchedule, Choice, in_order
 from cellplan.search.assign.schedules.solver import Relaxed, Solved, new_model, new_relaxation
 from cellplan.search.assign.schedules.transfers import is_possible
@@ -60,14 +60,16 @@ def cover_blocks(instance: Instance, *, effort: float, hint: BlockSchedule | Non
         effort: Work in units of deterministic time, about seconds of one processor.
         hint: A schedule that is known.
     """
-    blocks = list(islice(possible_blocks(instance), MOST_BLOCKS + 1))
-    if len(blocks) > MOST_BLOCKS:
-        return None
-    moves = least_moves(instance)
-    limits = np.unique(np.quantile(moves.of(blocks, FAR)[0], LIMITS).astype(np.int64) // 2).tolist()
-    covers = (_Cover.of(instance, blocks, moves, limit) for limit in limits)
-    cover, relaxed = max(((it, it.relaxed()) for it in covers), key=lambda it: it[1].bound)
-    return cover.chosen(relaxed, effort, hint)
+    relaxed = _Cover.relaxed_of(instance)
+    return None if relaxed is None else relaxed[0].chosen(relaxed[1], effort, hint)
+
+
+def bound_of_blocks(instance: Instance, *, least: int, effort: float, hint: BlockSchedule | None = None) -> int | None:
+    """The bound of ``best_blocks``, of the linear relaxation alone where that decides."""
+    relaxed = None if instance.rules.order_counts else _Cover.relaxed_of(instance)
+    if relaxed is None:
+        return best_blocks(instance, least=least, effort=effort, hint=hint).bound
+    return int(np.ceil(relaxed[1].bound / 2.0))
 
 
 def possible_blocks(instance: Instance) -> Iterator[frozenset[Key]]:
@@ -163,6 +165,17 @@ class _Cover:
                 ends[arc] = min(ends.get(arc, FAR), steps)
         return cls(instance=instance, blocks=list(cheapest.values()), arcs=_arcs(instance, ends, limit))
 
+    @classmethod
+    def relaxed_of(cls, instance: Instance) -> tuple[Self, Relaxed] | None:
+        """All possible blocks with the limit that makes the largest bound; None where there are too many."""
+        blocks = list(islice(possible_blocks(instance), MOST_BLOCKS + 1))
+        if len(blocks) > MOST_BLOCKS:
+            return None
+        moves = least_moves(instance)
+        limits = np.unique(np.quantile(moves.of(blocks, FAR)[0], LIMITS).astype(np.int64) // 2).tolist()
+        covers = (cls.of(instance, blocks, moves, limit) for limit in limits)
+        return max(((it, it.relaxed()) for it in covers), key=lambda it: it[1].bound)
+
     def relaxed(self) -> Relaxed:
         """The linear relaxation over all blocks."""
         model = new_relaxation()
@@ -195,7 +208,7 @@ class _Cover:
             schedule=next(iter(different), None),
             bound=int(np.ceil(bound / 2.0)),
             is_proved=solved.is_proved and solved.objective <= bound,
-            others=tuple(different[1 : 1 + MOST_OTHERS]),
+            others=tuple(different[1:]),
         )
 
     def _schedule(self, blocks: Sequence[frozenset[Key]]) -> BlockSchedule | None:

@@ -222,9 +222,9 @@ class Sequencer:
         at = np.ix_(*places)
         steps[at] = np.maximum(steps[at], refusal.steps)
 
-    def relocations(self, schedule: BlockSchedule) -> Iterator[BlockSchedule]:
-        """Schedules with one block at another place: of its station, or anywhere where that counts."""
-        return relocations(schedule, self.instance.goals, anywhere=self.instance.rules.order_counts)
+    def relocations(self, schedule: BlockSchedule, *, anywhere: bool = False) -> Iterator[BlockSchedule]:
+        """Schedules with one block at another place: of its station, or anywhere, as always where orders count."""
+        return relocations(schedule, self.instance.goals, anywhere=anywhere or self.instance.rules.order_counts)
 
     def tours(self, schedule: BlockSchedule) -> list[BlockSchedule]:
         """The blocks with their stations in the shortest tours; where tasks must follow others, as soon as they may."""

@@ -1,6 +1,6 @@
 """Transfers between blocks, certified straight; those that are refused cost what the move in legs takes instead."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, combinations, pairwise, product
 from typing import Final
@@ -69,12 +69,11 @@ class TransferCertifier:
         self._in_legs(sequencer, best)
         return min([self._as_known(sequencer, best), *([below] if below else [])], key=lambda it: it.steps)
 
-    def best(self, sequencer: Sequencer, schedule: BlockSchedule) -> SequencedBlocks:
-        """The best order that is found with certified transfers: of short tours, then as ``shortened``."""
-        first, *tours = sequencer.tours(schedule)
-        best = self.settle(sequencer, first)
-        for tour in tours:
-            best = self.settle(sequencer, tour, below=best)
+    def best(self, sequencer: Sequencer, trials: Sequence[SequencedBlocks]) -> SequencedBlocks:
+        """The best of some orders, those that straight transfers make short first, with certified ones; shortened."""
+        best = self.settle(sequencer, trials[0].schedule)
+        for trial in trials[1:]:
+            best = self.settle(sequencer, trial.schedule, below=best)
         return self.shortened(sequencer, best, most=MOST_TRIED)
 
     def shortened(self, sequencer: Sequencer, best: SequencedBlocks, *, most: int) -> SequencedBlocks:
@@ -85,7 +84,7 @@ class TransferCertifier:
         """
         tried, instance = 0, sequencer.instance
         while True:
-            for trial in chain(sequencer.relocations(best.schedule), exchanges(best.schedule, instance)):
+            for trial in chain(sequencer.relocations(best.schedule, anywhere=True), exchanges(best.schedule, instance)):
                 if tried == most:
                     return best
                 tried += 1
