@@ -160,7 +160,9 @@ def assign(
 def _cycle_of(search: AssignmentSearch, progress: Progress) -> float | None:
     """Cycle of a draft in [s] by the model; None where there is no schedule."""
     try:
-        return search.cycle(search.instance(progress))
+        instance = search.instance(progress)
+        blocks = search.little(instance)
+        return None if blocks is None else blocks.steps * instance.step
     except ImpossibleTasksError:
         return None
 
@@ -168,17 +170,17 @@ def _cycle_of(search: AssignmentSearch, progress: Progress) -> float | None:
 def _program_of(search: AssignmentSearch, progress: Progress) -> Assignment:
     """The program of all tasks of a draft."""
     draft = search.draft
-    first = instance = search.instance(progress)
+    instance = search.instance(progress)
     counts = search.counts
     for number in range(1, ROUNDS + 1):
         progress("blocks", (number - 1) / ROUNDS)
-        planned = search.planned(instance, is_refined=number == 1)
+        planned = search.planned(instance, is_first=number == 1)
         cell = written_cell(draft, instance, planned.sequenced)
         solution = _solved(cell, progress)
         if number == 1:
             steps = None if has_open_rests(draft.cell, instance) else planned.bound
             bound = None if steps is None else steps * instance.step
-            is_proved, others = planned.is_proved, planned.others
+            is_proved, others, without = planned.is_proved, planned.others, planned.without
         if not isinstance(solution, str) and (solution.passed or number == ROUNDS):
             return Assignment(
                 draft=draft.cell,
@@ -190,7 +192,7 @@ def _program_of(search: AssignmentSearch, progress: Progress) -> Assignment:
                 is_proved=is_proved,
                 greedy=planned.greedy * instance.step,
                 alternatives=alternatives_to(planned.sequenced, others),
-                without={name: search.without(first, name) for name in instance.robots},
+                without={name: it and it.steps * instance.step for name, it in without.items()},
                 rounds=number,
                 counts=counts | {"certificates": planned.examined, "refused": planned.refused},
             )

@@ -212,11 +212,13 @@ def _use(assignment: Assignment, blocks: Sequence[Record], waits: Mapping[str, R
 def _binding(assignment: Assignment, blocks: Sequence[Record], waits: Mapping[str, Record]) -> dict[str, Any]:
     """What the cycle is made of."""
     work = sum(block["end_s"] - block["begin_s"] for block in blocks)
+    cools = sum(assignment.sequenced.waits) * assignment.instance.step
     busiest = min(waits, key=lambda robot: sum(waits[robot].values()))
     return {
         "busiest_robot": busiest,
         "blocks_s": number(work),
-        "transfers_s": number(assignment.cycle - work),
+        "transfers_s": number(assignment.cycle - work - cools),
+        "cools_s": number(cools),
         "waiting_s": number(sum(time for of_robot in waits.values() for time in of_robot.values())),
     }
 
@@ -241,12 +243,14 @@ def assign_lines(record: Record) -> list[str]:
         f"{record['cell']}: {record['status']}, {record['cycle_time_s']:g} s",
         bound,
         f"  {len(record['blocks'])} blocks {binding['blocks_s']:g} s, transfers {binding['transfers_s']:g} s; "
+        + (f"for {binding['cools_s']:g} s the part cools; " if binding["cools_s"] else "")
         + _part_words(record),
         f"  a greedy schedule, scarce tasks first, would take {record['greedy_cycle_s']:g} s by the model",
     ]
     for name, use in record["robots"].items():
         busiest = " (busiest)" if name == binding["busiest_robot"] else ""
-        work = f"{use['tasks']} tasks, {use['work_s']:g} s at work, {use['use_percent']:.3g} %{busiest}"
+        tasks = f"{use['tasks']} task{'s' * (use['tasks'] != 1)}"
+        work = f"{tasks}, {use['work_s']:g} s at work, {use['use_percent']:.3g} %{busiest}"
         without = "has tasks that no other robot can do"
         if use["cycle_without_s"] is not None:
             without = f"without it about {use['cycle_without_s']:g} s"

@@ -52,6 +52,7 @@ class PlannedBlocks:
     is_proved: bool
     greedy: int  # [steps]
     others: tuple[SequencedBlocks, ...]  # other schedules
+    without: Mapping[str, SequencedBlocks | None]  # by robots that do no task; None where they have to
     examined: int
     refused: int
 
@@ -119,8 +120,8 @@ class AssignmentSearch:
         ends = partial(planned_ends, self.draft)
         return Refinement(search=search, clearance=clearance, certifier=certifier, planned_ends=ends)
 
-    def planned(self, instance: Instance, *, is_refined: bool) -> PlannedBlocks:
-        """The best schedule of an instance, with certified transfers."""
+    def planned(self, instance: Instance, *, is_first: bool) -> PlannedBlocks:
+        """The best schedule of an instance, with certified transfers; the first one with finer modes."""
         certifier, least = self._refinement.certifier, least_transfer(instance)
         sequencer = Sequencer(instance, refusals=self._refusals)
         greedy = greedy_schedule(instance)
@@ -129,10 +130,12 @@ class AssignmentSearch:
         answer = BlockAnswer(schedule=None, bound=None, is_proved=False)
         if is_installed():
             answer = best_blocks(instance, least=least, effort=self._effort, hint=exchanged)
-        schedules = [it for it in (answer.schedule, *answer.others, exchanged) if it is not None]
+        without = {name: self.without(instance, name) for name in instance.robots} if is_first else {}
+        schedules = [it.schedule for it in without.values() if it is not None]
+        schedules += [it for it in (answer.schedule, *answer.others, exchanged) if it is not None]
         others = sorted(map(sequencer.ordered, schedules), key=lambda it: it.steps)
         best, refined = certifier.best(sequencer, others), instance
-        if is_refined:
+        if is_first:
             best, refined = self._refinement.shortened(best, sequencer)
         bound = answer.bound
         if bound is not None and refined is not instance:
@@ -144,6 +147,7 @@ class AssignmentSearch:
             is_proved=answer.is_proved,
             greedy=nearest,
             others=tuple(others),
+            without=without,
             examined=certifier.examined,
             refused=len(sequencer.refusals),
         )
@@ -155,13 +159,13 @@ class AssignmentSearch:
             return BlockAnswer(schedule=schedule, bound=None, is_proved=False)
         return best_blocks(instance, least=least_transfer(instance), effort=self._effort, hint=schedule)
 
-    def without(self, instance: Instance, robot: str) -> float | None:
-        """Cycle in [s] by the model if a robot did no task; None where a task is its alone."""
+    def without(self, instance: Instance, robot: str) -> SequencedBlocks | None:
+        """The same if a robot did no task, as ``little``; None where a task is its alone."""
         others = instance.without(robot)
-        return self.cycle(others) if others.tasks == instance.tasks else None
+        return self.little(others) if others.tasks == instance.tasks else None
 
-    def cycle(self, instance: Instance) -> float | None:
-        """Cycle in [s] by the model with little effort, transfers certified; None where no schedule keeps all rules."""
+    def little(self, instance: Instance) -> SequencedBlocks | None:
+        """Blocks by the model with little effort, transfers certified; None where no schedule keeps all rules."""
         try:
             schedule = improved(instance, greedy_schedule(instance))
         except NoSolutionError:
@@ -170,8 +174,7 @@ class AssignmentSearch:
             least = least_transfer(instance)
             schedule = best_blocks(instance, least=least, effort=LITTLE, hint=schedule).schedule or schedule
         sequencer = Sequencer(instance, refusals=self._refusals)
-        settled = self._refinement.certifier.settle(sequencer, sequencer.ordered(schedule).schedule)
-        return settled.steps * instance.step
+        return self._refinement.certifier.settle(sequencer, sequencer.ordered(schedule).schedule)
 
     def _timed(self, goal: TaskGoal, modes: Mapping[Key, Sequence[TaskMode]]) -> TaskGoal:
         """The goal with the time that it takes at least where its program is retimed."""

@@ -49,7 +49,10 @@ def test_what_a_robot_more_brings_is_the_cycle_of_the_model_with_it(tmp_path: Pa
     assignment = assign(AssignmentDraft.load(with_third_arm(tmp_path, available=False)), effort=1)
     search = AssignmentSearch(AssignmentDraft.load(with_third_arm(tmp_path, available=True)), 1)
 
-    assert assignment.with_more == {"north": search.cycle(search.instance(silent))}
+    instance = search.instance(silent)
+    blocks = search.little(instance)
+    assert blocks is not None
+    assert assignment.with_more == {"north": blocks.steps * instance.step}
     assert assignment.with_more["north"] < assignment.cycle
     assert set(assignment.without) == {"west", "east"}
 

@@ -149,9 +149,10 @@ class Instance:
     def _part_steps(self) -> dict[tuple[int | None, int | None], int]:
         """Those between all stations in use."""
         holder, used = str(self.stations.holder), list(self.used)
+        places: list[int | None] = [None, *used]
         leaves, comes = (np.stack([self.homes[holder], *it[used]]) for it in (self.stations.left, self.stations.q))
         steps = self.transfer_steps(holder, leaves[:, None], comes[None])
-        return dict(zip(product((None, *used), repeat=2), steps.ravel().tolist(), strict=True))
+        return {(a, b): int(steps[i, k]) for (i, a), (k, b) in product(enumerate(places), repeat=2)}
 
 
 def with_rules(instance: Instance, rules: TaskRules) -> Instance:

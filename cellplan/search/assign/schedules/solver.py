@@ -6,6 +6,11 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any, Final
 
+import numpy as np
+
+from cellplan.cache import keep, key_of, recall
+from cellplan.geometry.arrays import Indices
+
 WORKERS: Final = 8  # searches that take turns; their number decides the answer, not the number of processors
 POOL: Final = 24  # answers that are known at the end
 ROUNDING: Final = 1e-6  # [steps] of a bound
@@ -59,9 +64,13 @@ class Relaxed:
 class Solved:
     """The best answer of a model that was found, and what is proved of all others.
 
+    An interrupted search goes on from here when it begins again: what was solved is kept in the cache.
+
     Attributes:
         answers: Values of the variables in the best answer, then in others that are nearly as good; none where none
             is known.
+        objective: The objective of the best answer.
+        bound: No answer has a smaller objective.
     """
 
     def __init__(self, model: Any, effort: float, hints: Sequence[tuple[Any, bool]] = ()) -> None:
@@ -75,39 +84,47 @@ class Solved:
 
         for literal, value in hints:
             model.add_hint(literal, value)
-        self._solver = cp_model.CpSolver()
-        parameters = self._solver.parameters
+        solver = cp_model.CpSolver()
+        parameters = solver.parameters
         parameters.num_workers, parameters.interleave_search, parameters.random_seed = WORKERS, True, 1
         parameters.max_deterministic_time = effort
         parameters.cp_model_probing_level = parameters.symmetry_level = 0  # they take longer than they save
         parameters.fill_additional_solutions_in_response, parameters.solution_pool_size = True, POOL
         parameters.catch_sigint_signal = False  # the solver would stop early and the command go on
-        with ThreadPoolExecutor(1) as thread:
-            solving = thread.submit(self._solver.solve, model)
-            try:
-                while not wait([solving], timeout=LISTENING).done:
-                    pass
-            except KeyboardInterrupt:
-                self._solver.stop_search()
-                raise
-        status, response = solving.result(timeout=LISTENING), self._solver.response_proto
-        pool = dict.fromkeys(tuple(it.values) for it in response.additional_solutions)
-        best = tuple(response.solution)
-        self.answers = [best, *(it for it in pool if it != best)] if best else []
-        self.is_proved = status == cp_model.OPTIMAL
-
-    @property
-    def objective(self) -> int:
-        """The objective of the answer."""
-        return round(self._solver.objective_value)
-
-    @property
-    def bound(self) -> int:
-        """No answer has a smaller objective."""
-        bound = self._solver.best_objective_bound - ROUNDING
-        return int(bound) + (bound > int(bound))
+        about = (*solver_version().values(), str(parameters), str(model.proto))
+        key = key_of("answers of a model", *(text.encode() for text in about))
+        if (known := recall(key)) is None:
+            keep(key, known := _solved(solver, model))
+        answers, (self.objective, self.bound, proved) = known[0], known[1].tolist()
+        self.answers = [tuple(it) for it in answers.tolist()]
+        self.is_proved = bool(proved)
 
     def true(self, literals: Mapping[Any, Any], answer: int = 0) -> list[Any]:
         """Keys of the literals that are true in an answer."""
         values = self.answers[answer]
         return [key for key, literal in literals.items() if values[literal.index]]
+
+
+def _solved(solver: Any, model: Any) -> tuple[Indices, Indices]:
+    """Answers of a model, shape (K, variables); and the objective, its bound and whether it is proved, shape (3,)."""
+    from ortools.sat.python import cp_model
+
+    with ThreadPoolExecutor(1) as thread:
+        solving = thread.submit(solver.solve, model)
+        try:
+            while not wait([solving], timeout=LISTENING).done:
+                pass
+        except KeyboardInterrupt:
+            solver.stop_search()
+            raise
+    status, response = solving.result(timeout=LISTENING), solver.response_proto
+    pool = dict.fromkeys(tuple(it.values) for it in response.additional_solutions)
+    best = tuple(response.solution)
+    answers = [best, *(it for it in pool if it != best)] if best else []
+    bound = solver.best_objective_bound - ROUNDING
+    figures = (
+        round(solver.objective_value) if best else 0,
+        int(bound) + (bound > int(bound)),
+        status == cp_model.OPTIMAL,
+    )
+    return np.array(answers, dtype=np.int64), np.array(figures, dtype=np.int64)
