@@ -192,7 +192,7 @@ def _program_of(search: AssignmentSearch, progress: Progress) -> Assignment:
                 is_proved=is_proved,
                 greedy=planned.greedy * instance.step,
                 alternatives=alternatives_to(planned.sequenced, others),
-                without={name: it and it.steps * instance.step for name, it in without.items()},
+                without={name: None if it is None else it.steps * instance.step for name, it in without.items()},
                 rounds=number,
                 counts=counts | {"certificates": planned.examined, "refused": planned.refused},
             )
