@@ -70,9 +70,9 @@ def unknown_robot_findings(document: YamlDocument) -> Iterator[Finding]:
             if robot not in known:
                 words = f"expected one of {listed(known)}, got {shown(robot)}{did_you_mean(robot, known)}"
                 yield document.finding(("tasks", name, "robot", index), words)
-    if nobody := [name for name, robots in open_tasks(document.root).items() if not robots]:
-        words = f"expected an available robot that does not hold the part, got none{_more(nobody[1:])}"
-        yield document.finding(("tasks", nobody[0], "robot"), words)
+    if undone := [name for name, robots in open_tasks(document.root).items() if not robots]:
+        words = f"expected an available robot that does not hold the part, got none{_more(undone[1:])}"
+        yield document.finding(("tasks", undone[0], "robot"), words)
 
 
 def _more(others: Sequence[str]) -> str:

@@ -26,7 +26,7 @@ from cellplan.search.assign.schedules.order import SequencedBlocks
 
 ROUNDS: Final = 4  # programs that are solved until one passes
 NEARLY: Final = 1.05  # [-] of the cycle of the program: so long are those of its alternatives at most
-MOST_OTHERS: Final = 5  # alternatives that are told
+MOST_OTHERS: Final = 5  # alternatives that are stated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
