@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders.export_jobs import NAMES, job_of, random_program
+from builders.paced_pairs import pair_job
 from builders.rapid_jobs import multimove_cell, named_signals
 from builders.scene_builders import arm_model, placed
 
@@ -196,3 +197,28 @@ def test_programs_of_lines_wait_in_the_same_words() -> None:
     assert [leading[0], leading[-1]] == meeting
     assert len(leading) == 6
     assert first.before(True) == ("SetDO do_alpha,0;",)
+
+
+def test_tasks_of_one_controller_share_no_work_object() -> None:
+    """Data that are PERS in two tasks are one, and the part stands elsewhere from the base of another arm."""
+    _, job, _ = pair_job("rapid")
+    cell = job.frame.cell
+    alpha, beta = cell.robots
+    assert alpha.control is not None
+    tasks = {"T_ROB1": "ROB_1", "T_ROB2": "ROB_2"}
+    robots = tuple(
+        replace(robot, control=alpha.control.model_copy(update={"task": task, "handshake": None}))
+        for robot, task in zip((alpha, beta), tasks, strict=True)
+    )
+    box = cell.controllers[alpha.control.id].model_copy(update={"tasks": tasks})
+    cell = replace(cell, robots=robots, controllers={alpha.control.id: box})
+    job = replace(job, frame=replace(job.frame, cell=cell))
+
+    files = RAPID.render(job)
+
+    assert RAPID.read(job.frame, files)[0].robots[alpha.name].seams == job.programs[0].robots[alpha.name].seams
+    for name in ("alpha.mod", "beta.mod"):
+        assert files[name].count("  TASK PERS wobjdata w_part_1 :=") == 1
+        shared = files | {name: files[name].replace("TASK PERS wobjdata", "PERS wobjdata")}
+        with pytest.raises(InputError, match="expected TASK PERS wobjdata"):
+            RAPID.read(job.frame, shared)

@@ -77,7 +77,7 @@ def read_data(
 def _examine(frame: ExportFrame, unit: RapidUnit, datum: Datum, part: PartFrame | None) -> None:
     """One declaration: how it is stored, the shape of its value, and what the cell says of it."""
     needed = _STORAGE.get(datum.kind)
-    if needed is not None and datum.storage != needed:
+    if needed is not None and datum.storage.removeprefix("task ") != needed:
         datum.statement.refuse(f"{needed.upper()} {datum.kind}", datum.storage.upper())
     if (datum.count is not None) is not (datum.kind == "tasks"):
         datum.statement.refuse("a number of elements in a list of tasks, and nowhere else")

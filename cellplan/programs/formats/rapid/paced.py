@@ -83,6 +83,14 @@ def work_object(number: int) -> str:
     return f"w_part_{number + 1}"
 
 
+def storage(frame: ExportFrame, robot: str) -> str:
+    """How work objects of a robot are stored: for its task alone where other tasks of the controller have some too."""
+    working = [frame.robot(name).control for name in {task.robot for task in frame.cell.tasks} - {robot}]
+    control = frame.robot(robot).control
+    is_shared = any(other is not None and control is not None and other.id == control.id for other in working)
+    return "TASK PERS" if is_shared else "PERS"
+
+
 def routine_names(frame: ExportFrame, unit: RapidUnit) -> dict[str, str]:
     """Name of the routine of each task of a robot."""
     tasks = [task.name for task in frame.cell.tasks if task.robot == unit.robot.name]
@@ -125,7 +133,7 @@ class PacedWriter:
         frame, name = self.job.frame, self.unit.robot.name
         for number, station in enumerate(frame.stations.get(name, ())):
             if station.X is not None:
-                yield f"PERS wobjdata {work_object(number)} := {work_object_text(frame, station)};"
+                yield f"{storage(frame, name)} wobjdata {work_object(number)} := {work_object_text(frame, station)};"
         for number in range(len(rapid_events(frame, self.unit).setup)):
             yield f"VAR triggdata {TRIGGER}_{number + 1};"
         for feed in sorted({feed_text(move.feed) for move in self.moves if move.is_tool}, key=float):
@@ -351,6 +359,8 @@ class PacedReader:
             if words[slot] != expected.lower():
                 statement.refuse(f"{expected} in a motion of '{task}'", words[slot])
             datum = self._data.require(statement, words[slot], kind)
+            if slot == "frame" and datum.storage.upper() != (kept := storage(self._frame, self._unit.robot.name)):
+                datum.statement.refuse(f"{kept} wobjdata, as tasks of a controller share what is PERS", datum.storage)
             if slot == "frame" and not _is_frame(value_of(datum), work_object_text(self._frame, station)):
                 datum.statement.refuse(f"{work_object_text(self._frame, station)} as the cell has it")
 

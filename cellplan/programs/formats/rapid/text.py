@@ -40,7 +40,7 @@ class Datum:
     """A declaration."""
 
     statement: RapidStatement  # where it stands
-    storage: str  # ``pers``, ``const`` or ``var``
+    storage: str  # ``pers``, ``task pers``, ``const`` or ``var``
     kind: str  # its data type, in lower case
     name: str  # its name as written
     count: int | None  # number of elements of an array; None for a single value
@@ -134,7 +134,7 @@ def _declare(module: RapidModule, statement: RapidStatement) -> None:
     if storage in {"pers", "const"} and not value:
         statement.refuse(f"a value of {name}")
     number = None if count is None else int(count)
-    module.data[key] = Datum(statement, storage, kind.lower(), name, number, value)
+    module.data[key] = Datum(statement, f"{(task or '').lower()}{storage}", kind.lower(), name, number, value)
 
 
 def _statements(text: str, file: str) -> Iterator[RapidStatement]:
