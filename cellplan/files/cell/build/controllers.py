@@ -49,7 +49,7 @@ def control_findings(
             entry = valid.controllers[control.id]
             yield from _of_kind(path, control, entry, document)
             yield from _signals((*path, "handshake"), control, entry, document)
-            yield from _frames(path, control, entry, document)
+            yield from _frames(path, control, entry, uses, document)
             if name in models:
                 yield from _joints((*path, "id"), entry, models[name], document)
     yield from _process_data(valid, document)
@@ -128,9 +128,9 @@ def _signals(
 
 
 def _frames(
-    path: KeyPath, control: RobotControlEntry, entry: ControllerEntry, document: YamlDocument
+    path: KeyPath, control: RobotControlEntry, entry: ControllerEntry, uses: Uses, document: YamlDocument
 ) -> Iterator[Finding]:
-    """Numbers of tools and bases that a controller of the kind has."""
+    """Numbers of tools and bases that a controller of the kind has, and no frame of two robots on a Yaskawa one."""
     stated: list[tuple[KeyPath, int | None, int | None]] = [
         (("tool_number",), control.tool_number, FRAMES.get(entry.kind)),
         (("base_number",), control.base_number, FRAMES.get(entry.kind)),
@@ -143,6 +143,8 @@ def _frames(
     for at, number in enumerate(control.frames):
         if number in control.frames[:at]:
             yield document.finding((*path, "frames", at), f"expected each number once, got {number} twice")
+        elif entry.kind == "yaskawa":
+            yield from _claim((*path, "frames", at), (control.id, "user frame", str(number)), uses, document)
 
 
 def _used_twice(path: KeyPath, control: RobotControlEntry, uses: Uses, document: YamlDocument) -> Iterator[Finding]:
@@ -154,11 +156,16 @@ def _used_twice(path: KeyPath, control: RobotControlEntry, uses: Uses, document:
         for robot, signal in control.handshake.inputs.items():
             claims.append(("input", ("handshake", "inputs", robot), str(signal)))
     for what, below, word in claims:
-        place = key_text((*path, *below))
-        first = uses.setdefault((control.id, what, word.lower()), place)
-        if first != place:
-            text = f"expected {_article(what)} that nothing else on '{control.id}' uses, got '{word}', as {first} does"
-            yield document.finding((*path, *below), text)
+        yield from _claim((*path, *below), (control.id, what, word), uses, document)
+
+
+def _claim(place: KeyPath, claim: tuple[str, str, str], uses: Uses, document: YamlDocument) -> Iterator[Finding]:
+    """What a controller has once is claimed: controller, what, name."""
+    controller, what, word = claim
+    first = uses.setdefault((controller, what, word.lower()), key_text(place))
+    if first != key_text(place):
+        text = f"expected {_article(what)} that nothing else on '{controller}' uses, got '{word}', as {first} does"
+        yield document.finding(place, text)
 
 
 def _process_outputs(valid: ValidEntries, uses: Uses, document: YamlDocument) -> Iterator[Finding]:
@@ -177,7 +184,7 @@ def _process_outputs(valid: ValidEntries, uses: Uses, document: YamlDocument) ->
 
 
 def _article(noun: str) -> str:
-    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
+    return f"an {noun}" if noun[0] in "aeio" else f"a {noun}"
 
 
 def _process_data(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:

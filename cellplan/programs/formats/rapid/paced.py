@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.transforms import Array, pose, pose_from, quaternion_to_rotation
-from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows, Station
+from cellplan.geometry.transforms import Array, pose_from, quaternion_to_rotation
+from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows
 from cellplan.model.units import MM
 from cellplan.programs.elements.handshake import HandshakeStep
 from cellplan.programs.elements.paced import (
@@ -32,9 +32,16 @@ from cellplan.programs.formats.rapid.data import RapidData
 from cellplan.programs.formats.rapid.moves import STOP, TURN, Place, RapidMove, read_move
 from cellplan.programs.formats.rapid.rows import UNIT_TOL, rounding, rows_of
 from cellplan.programs.formats.rapid.speeds import axis_speeds, turn_speed
-from cellplan.programs.formats.rapid.targets import frame_text, joint_targets, part_targets
+from cellplan.programs.formats.rapid.targets import joint_targets, part_targets, work_object_text
 from cellplan.programs.formats.rapid.text import Datum, RapidStatement, plain_statement, value_of
-from cellplan.programs.formats.rapid.units import DECIMALS, LONGEST_NAME, RESERVED, TASKS, ZONES, RapidUnit, rapid_task
+from cellplan.programs.formats.rapid.units import (
+    LONGEST_NAME,
+    RESERVED,
+    TASKS,
+    ZONES,
+    RapidUnit,
+    storage,
+)
 from cellplan.programs.formats.zones import LEAST_SHARE, on_scale
 
 LONGEST_ROUTINE: Final = LONGEST_NAME - 5  # room for the number of a point
@@ -81,14 +88,6 @@ def signal_text(step: HandshakeStep) -> str:
 def work_object(number: int) -> str:
     """Name of the work object of a station, counted from 0."""
     return f"w_part_{number + 1}"
-
-
-def storage(frame: ExportFrame, robot: str) -> str:
-    """How work objects of a robot are stored: for its task alone where other tasks of the controller have some too."""
-    working = [frame.robot(name).control for name in {task.robot for task in frame.cell.tasks} - {robot}]
-    control = frame.robot(robot).control
-    is_shared = any(other is not None and control is not None and other.id == control.id for other in working)
-    return "TASK PERS" if is_shared else "PERS"
 
 
 def routine_names(frame: ExportFrame, unit: RapidUnit) -> dict[str, str]:
@@ -216,17 +215,6 @@ def zone_text(size: int) -> str:
 def speed_name(feed: str) -> str:
     """Name of the speed of a tool in [mm/s]."""
     return f"s_{feed.replace('.', '_')}"
-
-
-def work_object_text(frame: ExportFrame, station: Station) -> str:
-    """A work object: moved by the unit of the holder, or fixed in the base of the controller."""
-    X = pose() if station.X is None else station.X
-    part, none = frame_text(X, DECIMALS), frame_text(pose(), DECIMALS)
-    if station.holder is None:
-        return f'[FALSE,TRUE,"",{part},{none}]'
-    control = frame.robot(station.holder).control
-    tasks = frame.cell.controllers[control.id].tasks if control else {}
-    return f'[FALSE,FALSE,"{tasks[rapid_task(frame, station.holder)]}",{none},{part}]'
 
 
 class PacedReader:
@@ -359,8 +347,8 @@ class PacedReader:
             if words[slot] != expected.lower():
                 statement.refuse(f"{expected} in a motion of '{task}'", words[slot])
             datum = self._data.require(statement, words[slot], kind)
-            if slot == "frame" and datum.storage.upper() != (kept := storage(self._frame, self._unit.robot.name)):
-                datum.statement.refuse(f"{kept} wobjdata, as tasks of a controller share what is PERS", datum.storage)
+            if slot == "frame" and datum.storage.upper() != (how := storage(self._frame, self._unit.robot.name)):
+                datum.statement.refuse(f"{how} wobjdata, as tasks of a controller share what is PERS", datum.storage)
             if slot == "frame" and not _is_frame(value_of(datum), work_object_text(self._frame, station)):
                 datum.statement.refuse(f"{work_object_text(self._frame, station)} as the cell has it")
 

@@ -12,14 +12,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell.cell import Robot
+from cellplan.model.report.exported import ExportFrame, Station
 from cellplan.model.units import MM
 from cellplan.programs.elements.conventions import QUATERNION_DECIMALS, quaternions
 from cellplan.programs.elements.joints import Axes, to_numbers
 from cellplan.programs.elements.text import fixed
 from cellplan.programs.elements.wrist import sides_at_zero, wrist_sides
-from cellplan.programs.formats.rapid.units import ABSENT, EXTERNAL_AXES, RapidUnit
+from cellplan.programs.formats.rapid.units import ABSENT, DECIMALS, EXTERNAL_AXES, RapidUnit, rapid_task
 
 QUARTER: Final = 90.0  # [deg]
 
@@ -80,3 +81,14 @@ def _external(unit: RapidUnit, numbers: Array) -> list[str]:
 def _fields(numbers: Array, decimals: int) -> list[str]:
     """Rows of numbers with fixed decimals."""
     return [",".join(fixed(number, decimals) for number in row) for row in numbers.tolist()]
+
+
+def work_object_text(frame: ExportFrame, station: Station) -> str:
+    """A work object: moved by the unit of the holder, or fixed in the base of the controller."""
+    X = pose() if station.X is None else station.X
+    part, none = frame_text(X, DECIMALS), frame_text(pose(), DECIMALS)
+    if station.holder is None:
+        return f'[FALSE,TRUE,"",{part},{none}]'
+    control = frame.robot(station.holder).control
+    tasks = frame.cell.controllers[control.id].tasks if control else {}
+    return f'[FALSE,FALSE,"{tasks[rapid_task(frame, station.holder)]}",{none},{part}]'

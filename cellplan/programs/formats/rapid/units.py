@@ -186,3 +186,11 @@ def require_one_controller(frame: ExportFrame) -> None:
     if len(names) > 1 or len(frame.robots) < 2:
         got = f"controllers {', '.join(names)}" if len(names) > 1 else f"{len(frame.robots)}"
         raise InputError(f"rapid: expected at least two robots on one controller for synchronised programs, got {got}")
+
+
+def storage(frame: ExportFrame, robot: str) -> str:
+    """How work objects of a robot are stored: for its task alone where other tasks of the controller have some too."""
+    working = [frame.robot(name).control for name in {task.robot for task in frame.cell.tasks} - {robot}]
+    control = frame.robot(robot).control
+    is_shared = any(other is not None and control is not None and other.id == control.id for other in working)
+    return "TASK PERS" if is_shared else "PERS"
