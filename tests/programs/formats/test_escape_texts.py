@@ -310,6 +310,29 @@ def test_a_register_may_have_another_name_and_none_that_the_language_has(
     assert f"beta.controller.step_register: {refusal}, got '{registers[1]}'" in str(finding)
 
 
+@pytest.mark.parametrize(("register", "is_right"), [(None, False), (74, False), (73, True), (89, True)])
+def test_registers_of_two_robots_of_a_fanuc_controller_do_not_overlap(register: int | None, is_right: bool) -> None:
+    frame = job_in("fanuc_ls").frame
+    alpha, beta = frame.cell.robots
+    assert alpha.control is not None
+    assert beta.control is not None
+    stated = {"id": alpha.control.id, "group": 2, "step_register": register}
+    robots = (
+        replace(alpha, control=alpha.control.model_copy(update={"group": 1})),  # with register 81
+        replace(beta, control=beta.control.model_copy(update=stated)),
+    )
+    frame = replace(frame, cell=replace(frame.cell, robots=robots))
+
+    said = [
+        str(error) for error in refusals(*with_register(DIALECTS["fanuc_ls"], ESCAPES["fanuc_ls"]).demands(frame, 0))
+    ]
+
+    wanted = (
+        "robots.beta.controller.step_register: expected one 8 or more from that of 'alpha' on the same controller, 81"
+    )
+    assert any(text.startswith(wanted) for text in said) is not is_right
+
+
 def test_more_rows_than_a_program_of_a_controller_has_points_are_refused() -> None:
     job = job_in("fanuc_ls")
     program = escape_of("fanuc_ls", job, "beta")
