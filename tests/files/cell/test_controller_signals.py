@@ -12,6 +12,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.settings.controllers import HandshakeEntry
 
 KUKA = "    model: kuka_kr6\n"
+WEIGHTS = "    weights: [1, 1, 1, 1, 1, 1]\n"  # of the worker
 LEADS = "{id: c1, handshake: {output: 5, inputs: {worker: 7}}}"
 
 Load = Callable[..., Cell]
@@ -173,3 +174,25 @@ def test_no_handshake_uses_the_output_of_a_process(
         connected(*changes)
 
     assert finding in str(caught.value)
+
+
+@pytest.mark.parametrize(("kind", "is_right"), [("yaskawa", False), ("fanuc", True)])
+def test_robots_of_a_yaskawa_controller_have_user_frames_of_their_own(
+    connected: Load, kind: str, is_right: bool
+) -> None:
+    changes = (
+        ("kind: kuka}", f"kind: {kind}}}"),
+        (LEADS, "{id: c1, group: 1, frames: [3, 4]}"),
+        (WEIGHTS, f"{WEIGHTS}    controller: {{id: c1, group: 2, frames: [5, 4]}}\n"),
+    )
+    if is_right:
+        assert len(connected(*changes).robots) == 2
+        return
+    with pytest.raises(InvalidFileError) as caught:
+        connected(*changes)
+
+    (finding,) = str(caught.value).splitlines()
+    assert finding.endswith(
+        "robots.worker.controller.frames[1]: expected a user frame that nothing else on 'c1' uses, got '4', as "
+        "robots.holder.controller.frames[1] does"
+    )

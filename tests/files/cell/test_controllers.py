@@ -308,24 +308,6 @@ def test_what_one_robot_uses_on_a_controller_no_other_one_does(connected: Load, 
     assert str(caught.value).splitlines() == [f"c:13: robots.worker.controller.{message}"]
 
 
-@pytest.mark.parametrize(("kind", "is_right"), [("yaskawa", False), ("fanuc", True)])
-def test_robots_of_a_yaskawa_controller_have_user_frames_of_their_own(
-    connected: Load, kind: str, is_right: bool
-) -> None:
-    groups = ((LEADS, "{id: c2, group: 1, frames: [3, 4]}"), (FOLLOWS, "{id: c2, group: 2, frames: [5, 4]}"))
-    changes = ((FIRST, ""), (STOP, ""), (SECOND, f"  c2: {{kind: {kind}}}\n"), *groups)
-    if is_right:
-        assert len(connected(*changes).robots) == 2
-        return
-    with pytest.raises(InvalidFileError) as caught:
-        connected(*changes)
-
-    assert str(caught.value).splitlines() == [
-        "c:13: robots.worker.controller.frames[1]: expected a user frame that nothing else on 'c2' uses, got '4', as "
-        "robots.holder.controller.frames[1] does"
-    ]
-
-
 def test_the_same_number_may_be_an_output_and_an_input(connected: Load) -> None:
     holder = connected(("inputs: {worker: 7}", "inputs: {worker: 5}")).robot("holder").control
 
