@@ -1,10 +1,12 @@
 """Process of a task in programs: the statements of its controller, in the three forms that makers have."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from cellplan.errors import InputError
+from cellplan.model.cell.cell import Cell
 from cellplan.model.settings.controllers import ControllerEntry, KindName
 from cellplan.model.settings.process_statements import (
     DATA_SLOT,
@@ -89,6 +91,24 @@ class ProcessForm:
         """All statements, with some data of which each has the same form."""
         data = next(iter(self.entry.data.values()), "")
         return (*_read(self, on=True, data=data), *_read(self, on=False, data=data))
+
+
+def shared_outputs(cell: Cell, tasks: Sequence[str]) -> Iterator[InputError]:
+    """Outputs that one of some tasks, which are done at once, would switch off while another one needs them."""
+    used: dict[tuple[str, str], str] = {}
+    for task in map(cell.task, tasks):
+        control = cell.robot(task.robot).control
+        if control is None or task.process is None:
+            continue
+        form = ProcessForm.of(cell.controllers[control.id])
+        begun = () if form is None else _read(form, on=True, data=form.data(task.name))
+        for output in (read.words["name"] for read in begun if read.switch.is_output):
+            other = used.setdefault((control.id, output), task.name)
+            if other != task.name:
+                yield InputError(
+                    f"controllers.{control.id}.process: expected an output for each of the tasks '{other}' and "
+                    f"'{task.name}', which are done at once, by the slot {DATA_SLOT}, got {output} for both"
+                )
 
 
 def _read(form: ProcessForm, *, on: bool, data: str) -> tuple[ReadStatement, ...]:

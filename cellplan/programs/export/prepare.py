@@ -13,6 +13,7 @@ from cellplan.programs.elements.corners import units_of
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.handshake import speakers
 from cellplan.programs.elements.joints import in_step
+from cellplan.programs.elements.process import shared_outputs
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import THIN_DEG, THIN_MM, Choice, exported_robots
 from cellplan.programs.export.refusals import frame_of, is_at_cycle, unmet_demands
@@ -141,6 +142,8 @@ def _with_lines(
     """
     frame, essential = job.frame, essential_rows(shared.run)
     full = _with_orders(full_rows(shared.run), orders)
+    phases = [phase for program in essential for phase in program.work]
+    raise_findings(error for phase in phases for error in shared_outputs(phase.cell, phase.tasks))
     by_joints: dict[str, str] = {}
     for task, holder in on_moving_parts(full, essential) if frame.promise.waits else ():
         if (robot := frame.cell.task(task).robot) in frame.robots and holder not in in_step(frame, robot):

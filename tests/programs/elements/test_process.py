@@ -1,12 +1,15 @@
 """Process statements in programs: where they stand, with which data, and what the controller does by itself."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
+from builders.paced_pairs import OTHER_TASK, pair_job
+from builders.seam_jobs import CONTROLLER, TASK
 
 from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.model.settings.process_statements import read_statement
-from cellplan.programs.elements.process import ProcessForm
+from cellplan.programs.elements.process import ProcessForm, shared_outputs
 
 ENDS = r"{point}, {speed}, seam1, {data} \Weave:=weave1, {zone}, {tool} \WObj:={frame}"
 SLOTS = {
@@ -131,3 +134,26 @@ def test_lines_are_read_back_as_what_they_switch(kind: str, on: list[str], off: 
         assert begun is not None
         assert ended is not None
         assert begun.is_ended_by(ended)
+
+
+@pytest.mark.parametrize(
+    ("process", "said"),
+    [
+        ({"on": "$OUT[6]=TRUE", "off": "$OUT[6]=FALSE"}, ["$out[6] for both"]),
+        ({"on": "$OUT[{data}]=TRUE", "off": "$OUT[{data}]=FALSE", "data": {TASK: "6", OTHER_TASK: "7"}}, []),
+        ({"on": "ARC_ON()", "off": "ARC_OFF()"}, []),
+    ],
+)
+def test_tools_of_a_controller_that_work_at_once_have_outputs_of_their_own(
+    process: dict[str, Any], said: list[str]
+) -> None:
+    _, job, _ = pair_job("krl")
+    cell = job.frame.cell
+    alpha, beta = cell.robots
+    entry = ControllerEntry.model_validate({"kind": "kuka", "process": process})
+    cell = replace(cell, robots=(alpha, replace(beta, control=alpha.control)), controllers={CONTROLLER: entry})
+
+    errors = [str(error) for error in shared_outputs(cell, (TASK, OTHER_TASK))]
+
+    assert [error.rpartition("got ")[2] for error in errors] == said
+    assert not list(shared_outputs(cell, (TASK,)))
