@@ -19,6 +19,7 @@ def load_errors(path: Path | str, cell: Cell) -> CellErrors:
     """Read an errors file.
 
     Args:
+        path: The file.
         cell: The cell it belongs to: its robots and joints are the ones that may be named.
 
     Raises:

@@ -51,6 +51,10 @@ def alternate(
 
     Each step is a folder of its own, ``1-assign``, ``1-layout``, ``2-assign`` and so on, with ``best.yaml``.
 
+    Args:
+        request: What is searched for; its cell has open tasks.
+        workers: Processes that search layouts.
+
     Raises:
         InputError: The cell cannot be assigned, or its layout not be searched.
         NoSolutionError: No layout that was tried has an assignment.

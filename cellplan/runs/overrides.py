@@ -25,6 +25,7 @@ def with_overrides(cell: Cell, settings: Iterable[str] = (), **options: str | fl
     """The cell with the values of options; see ``Cell.with_values``.
 
     Args:
+        cell: The cell as written.
         settings: Further values as ``KEY=VALUE``, with addresses of the cell file as keys.
         **options: Values by the names in ``ADDRESSES``; None leaves the cell as it is.
 

@@ -51,6 +51,7 @@ def solve(
         near: Folder of a run of the same robots, of which starts and homes that are to be found keep the branches.
         is_reported: Whether figures of clocks that no check judges are worked out too, which a search does not need:
             the allowed skew, and stops of a robot.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The cell cannot be worked with: a path misses the part, a given start is off its task.
@@ -66,6 +67,7 @@ def solve_motion(
     """All phases, verified but for their clearance, and the scene of the solved cell; see ``solve``.
 
     Args:
+        near: Folder of a run of which the branches are kept.
         early: Begins with the clearance of each phase as soon as its rows are known.
     """
     refuse_clock_name(cell)
@@ -129,6 +131,7 @@ def certified(
 
     Args:
         is_reported: See ``solve``; never of a clearance without the curves of a report.
+        early: Has the clearance.
     """
     phases = []
     for run in solution.runs:

@@ -26,11 +26,13 @@ def verify(
     """Recompute tool errors, joint limits and clearance from the text of joint tables.
 
     Args:
+        cell: The cell the tables were made for.
         tables: Text of one joint table per robot, by robot name.
         task: Name of the only task that was worked on, or of the phase to verify where the program has several; the
             report counts time from the start of that phase.
         clock: Text of the clock of the program, ``tables/clock.csv``: for its nominal times where the cell has another
             ``motion.timing`` than ``as_written``, and for the rows of transfer moves of a program from home to home.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: A table is missing, unreadable, or does not fit the cell; there is no such task; a robot moves that

@@ -46,8 +46,10 @@ def write_run(
     and until then how to make it.
 
     Args:
+        solution: The solution.
         folder: The run folder; an older run there is replaced.
         keep_rejected: Write the tables of a failed solution too, under ``rejected/``, marked in every header.
+        progress: Called with the stage and the fraction done.
         formats: Further formats of the plots beside SVG: ``png``, ``pdf``; both need matplotlib.
 
     Returns:

@@ -103,6 +103,7 @@ def load_cell(
     """Read a cell file and everything it names.
 
     Args:
+        path: The cell file.
         allow_dirs: Folders, beside the cell's own and those that the user allows for every cell, that the files it
             names may lie in.
         folder: The folder that its names start from; None for the one it lies in.

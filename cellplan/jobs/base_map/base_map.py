@@ -168,6 +168,7 @@ def base_map(
         robot: Name of an operator: a robot with a task that does not hold the part.
         grid: Where its base is tried.
         certify: How many of the best places are solved and verified.
+        progress: Called with the stage and the fraction done.
 
     Returns:
         The record of ``map.json``; the same as that of ``map_study``.
@@ -202,10 +203,12 @@ def map_study(
     tile whose process crashed or took too long are not judged, and say why.
 
     Args:
+        request: What the map is made of.
         folder: Folder of the study; an earlier one is replaced, or continued with ``resume``.
         workers: Number of processes that judge places; or an executor, which stays open.
         resume: Whether tiles that the folder holds already are not judged again.
         certify: How many of the best places are solved and verified.
+        progress: Called with the stage and the fraction done.
 
     Returns:
         The record of ``map.json``; see ``base_map``.
@@ -280,6 +283,7 @@ def write_base_map(record: Record, folder: Path, *, formats: Collection[str] = (
     """Write ``map.json``, ``map.html`` and ``map.svg`` into a folder, which appears whole or not at all.
 
     Args:
+        record: As ``base_map`` returns it.
         folder: The folder; an earlier map there is replaced.
         formats: Formats of the picture beside SVG: ``png``, ``pdf``; both need matplotlib.
 

@@ -74,10 +74,12 @@ def compare(
     with its reason. The folder holds ``study.jsonl``, ``study.json``, ``study.csv``, ``study.html`` and plots.
 
     Args:
+        job: What is compared.
         folder: Folder of the study; an earlier study there is replaced, or continued with ``resume``.
         workers: Number of processes that solve and verify, each with about the memory of ``cellplan solve``; or an
             executor.
         resume: Whether what the folder holds already is not computed again.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: A cell cannot be read, a folder is not a run, something is named twice, or the folder of the study

@@ -355,7 +355,9 @@ def write_fastest(cycles: ShortestCycles, folder: Path, *, progress: Progress = 
     it loads from the folder of that cell.
 
     Args:
+        cycles: As ``fastest`` returns it.
         folder: The folder; an earlier one is replaced.
+        progress: Called with the stage and the fraction done.
 
     Returns:
         The record in ``fastest.json``.

@@ -107,6 +107,7 @@ def fastest(
         demand: Parts per hour that the calmest program is chosen for.
         points: Number of calmer cycles of each law on the production curve.
         workers: Largest number of processes that solve these; one where more would not pay.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The cell cannot be worked with, or a task has times that do not follow the clock.

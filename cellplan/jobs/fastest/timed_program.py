@@ -86,7 +86,11 @@ class TimedProgram:
         progress: Progress,
         early: EarlyClearance | None = None,
     ) -> Self:
-        """The program of a cell with other values, verified but for its clearance."""
+        """The program of a cell with other values, verified but for its clearance.
+
+        Args:
+            early: Begins with its clearance at once.
+        """
         scene, solution = solve_motion(cell.with_values(values), task=task, progress=progress, early=early)
         scaled = [run for run in solution.runs if _is_scaled(run, cell)]
         rows = [_rows(run) for run in scaled]

@@ -78,6 +78,7 @@ def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = sile
 
     Args:
         request: Which run or cell.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The path is neither a run nor a cell, or does not fit the options; a robot has more frames of the
@@ -112,6 +113,7 @@ def write_floor_plan(plan: FloorPlan, target: Path, form: PlanFormat | str = Pla
     """Write a floor plan whole or not at all; gives the size of the file in bytes.
 
     Args:
+        plan: What ``requested_floor_plan`` returned.
         target: The file; an older floor plan there is replaced.
         form: ``svg`` or ``dxf``.
 

@@ -143,7 +143,11 @@ def layout_record(
     tried: Mapping[int, CandidateResult],
     best: CandidateResult | None,
 ) -> LayoutRecord:
-    """The search in printed units."""
+    """The search in printed units.
+
+    Args:
+        tried: What came of those that were solved in full, by number.
+    """
     request, cell = ready.request, ready.cell
     listed = list(_candidates(ready, finished, tried))
     standing = best.standing if best else None if ready.unled else standing_of_given(ready)

@@ -152,10 +152,12 @@ def search_layout(
     the same, for any number of workers.
 
     Args:
+        request: What is searched for.
         folder: Folder of the study; an earlier one is replaced, or continued with ``resume``.
         stop: Where it ends: a number of trials, or a budget of seconds; None for 60 s.
         workers: Number of processes that search; or an executor, which stays open, such as ``layout_workers``.
         resume: Whether trials that the folder holds already are not repeated.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The cell cannot be read or searched, or the folder cannot be used.

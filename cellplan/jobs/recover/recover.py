@@ -78,10 +78,12 @@ def recover(
     at one time, the program is played backwards first.
 
     Args:
+        run: The verified run.
         at: Time of the program in [s], linear between rows.
         frozen: Time of the program at which a robot stands instead, by its name.
         keep: Names of the robots that are to stand still.
         transfer: How fast all moves are at most; None for ``program.transfer`` of the cell.
+        progress: Called with the stage and the fraction done.
 
     Returns:
         The tables and what was found on them; without tables, and with the reason, where no recovery was found.

@@ -187,6 +187,8 @@ def write_recovery(recovery: Recovery, folder: Path, programs: Programs = NONE) 
 
     Args:
         recovery: The recovery; without tables where none was found.
+        folder: Where its files go.
+        programs: Its programs by format.
 
     Returns:
         The record in ``recovery.json``.

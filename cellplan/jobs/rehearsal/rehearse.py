@@ -63,6 +63,7 @@ def rehearse(
         feedback: Correct from pass to pass.
         in_pass: Also execute with the error measured at each sample fed back at the next.
         rounds: Maximum number of corrections from pass to pass.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The cell cannot be worked with, several robots hold the part, or there are more trials than can be

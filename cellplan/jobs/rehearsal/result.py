@@ -215,8 +215,10 @@ def write_rehearsal(
     ``tables/``, or ``tables/<task>/`` where there is one run per task; only when everything passed.
 
     Args:
+        rehearsal: The rehearsal.
         folder: The folder; an older rehearsal there is replaced.
         formats: Further formats of the plots beside SVG: ``png``, ``pdf``; both need matplotlib.
+        progress: Called with the stage and the fraction done.
 
     Returns:
         The record in the ``rehearsal.json`` of the folder.

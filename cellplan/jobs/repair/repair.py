@@ -76,6 +76,7 @@ def repair(request: LayoutRequest, *, workers: int | Executor = 1, progress: Pro
         request: What is repaired; its objective counts for nothing.
         workers: Number of processes; or an executor, which stays open. What passes on other machines is solved here
             once more.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The cell cannot be read, or its job is not one that can be searched.

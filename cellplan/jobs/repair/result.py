@@ -166,6 +166,8 @@ def write_repair(repair: Repair, request: LayoutRequest, folder: Path) -> Advice
     the first remedy, and the files beside it that it names.
 
     Args:
+        repair: As ``repair`` returns it.
+        request: What was repaired.
         folder: The folder; an earlier one is replaced.
 
     Returns:

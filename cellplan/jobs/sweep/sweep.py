@@ -62,9 +62,11 @@ def sweep(
 
     Args:
         job: The cell and what is set in it for all variants.
+        axes: Keys that vary and their values.
         folder: Folder of the study; an earlier study there is replaced, or continued with ``resume``.
         workers: Number of processes that solve, each with about the memory of ``cellplan solve``; or an executor.
         resume: Whether variants that the folder holds already are not solved again.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The cell cannot be read, an address does not exist, or the folder cannot be used.

@@ -170,6 +170,10 @@ class ViewRequest:
 def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewRecord, Path]:
     """The record of a page, and where the page belongs; a place that it may not take is refused first.
 
+    Args:
+        request: What is to be shown.
+        progress: Called with the stage and the fraction done.
+
     Raises:
         InputError: The path is neither a run, nor a cell, nor a layout search, or does not fit the options.
     """
@@ -227,6 +231,7 @@ def write_view(record: ViewRecord, target: Path) -> int:
     """Write a page whole or not at all; gives its size in bytes.
 
     Args:
+        record: As ``view`` returns it.
         target: The page; an older one there is replaced.
 
     Raises:

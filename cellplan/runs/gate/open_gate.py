@@ -38,7 +38,7 @@ def open_gate(
         cell: The cell file that was solved; None when it is not available.
         controllers: A file of names of tasks, signals, tools and frames that take the place of those of the cell.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
-        refuse: Called when the cell is read and before anything is verified; raises what speaks against the use.
+        refuse: Called when the cell is read, before anything is verified; raises what speaks against use of the run.
         progress: Called with the stage and the fraction done.
 
     Raises:

@@ -75,6 +75,7 @@ def network(
         q: Stacked joint vector in [rad] or [m], shape (nq,).
         plane: Plane of P in which everything moves (PPR chains, three rows); None for space (PPPS, six rows).
         tree_order: Order in which joints are offered to the spanning tree; any order gives the same speeds.
+        measure_grasps: Whether further holders are let go and measured, see `coupling_graph`.
 
     Raises:
         InputError: The configuration does not fit the cell, or a fixed part has no pose.

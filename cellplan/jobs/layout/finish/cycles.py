@@ -33,7 +33,10 @@ def draft(
     """The program of a layout in a cycle, or at the duration of the cell, or retimed; verified but for its clearance.
 
     Args:
+        ready: The search.
+        cell: The cell of the layout.
         cycle: Its cycle in [s], if that may change.
+        progress: Called with the stage and the fraction done.
         early: Begins with its clearance at once, unless its duration may still change.
     """
     is_cycle = ready.request.objective is Objective.CYCLE
