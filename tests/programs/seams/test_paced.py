@@ -340,9 +340,8 @@ def test_a_ring_and_a_corner_are_jobs_of_a_yaskawa_arm(yaskawa: Path) -> None:
 
     ring, corner = ((yaskawa / "jobs" / f"{name}.JBI").read_text(encoding="utf-8") for name in ("RING", "CORNER"))
     assert re.findall(r"MOV(.) C\d+ V=40\.0 PL=(\d)", ring) == [
-        *[("C", "0"), ("C", "1"), ("C", "2")],  # each arc begins where the tool is
-        *[("L", "2"), ("C", "2"), ("C", "1"), ("C", "2")],
-        *[("L", "2"), ("C", "2"), ("C", "1"), ("C", "0")],
+        *[("C", "0"), ("C", "1"), ("C", "2")],  # the first arc begins where the tool is; the others share its points
+        *[("C", "1"), ("C", "2"), ("C", "1"), ("C", "0")],
     ]
     assert re.findall(r"MOV(.) C\d+ V=40\.0 PL=(\d)", corner) == [("L", "1"), ("L", "0")]
 
