@@ -90,6 +90,7 @@ LONG = {  # their commands and functions have tests of their own, which are quic
     "secondary-goals.md",
     "sweep-values.md",
     "load-sharing.md",
+    "report-json.md",
     "demanded-feeds.md",
     "place-a-robot.md",
     "tutorial.md",

@@ -179,6 +179,7 @@ def two_tasks_map(two_tasks: Cell) -> Any:
     return base_map(two_tasks, "right", WIDE)
 
 
+@pytest.mark.slow
 def test_a_place_of_a_program_passes_where_it_does_for_each_of_its_tasks_alone(
     block: Cell, block_map: Any, two_tasks_map: Any
 ) -> None:

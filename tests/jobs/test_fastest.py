@@ -51,6 +51,7 @@ def folder(cycles: ShortestCycles, tmp_path_factory: pytest.TempPathFactory) -> 
     return folder
 
 
+@pytest.mark.slow
 def test_the_time_laws_keep_all_limits_and_would_not_a_step_faster(cell: Cell, cycles: ShortestCycles) -> None:
     cycle = cycles.by_time_laws
     binding = cycle.bindings[0]

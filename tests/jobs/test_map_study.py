@@ -62,6 +62,7 @@ class Crashing(InThisProcess):
         return lost
 
 
+@pytest.mark.slow
 def test_the_record_is_that_of_a_map_made_in_one_go(folder: Path) -> None:
     cell = load_cell(CELL).with_values(
         {"robots.left.start_deg": [50, -85, 35], "motion.duration_s": 2, "motion.step_s": 0.02}

@@ -39,6 +39,7 @@ def by_hand(run: Run, rate: float) -> Mapping[tuple[str, str], Check]:
     return {(check.name, check.subject): check for check in limited(report.checks)}
 
 
+@pytest.mark.slow
 def test_transfer_moves_keep_both_limits_and_come_near_one_of_them(slow: Solution) -> None:
     for run in slow.runs:
         checks = limited(run.report.checks)

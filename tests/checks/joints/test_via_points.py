@@ -45,6 +45,7 @@ def rows_at(q: Array, degrees: list[float]) -> list[int]:
     return np.flatnonzero(np.abs(q - np.radians(degrees)).max(axis=1) < 1e-9).tolist()
 
 
+@pytest.mark.slow
 def test_robots_pass_their_via_points_in_their_order_and_the_others_go_in_the_leg_between(solution: Solution) -> None:
     first, second = (next(run for run in solution.runs if run.name == f"transfer-{number}") for number in (1, 2))
     home = [0, -20, 50, 0, -45, -180]

@@ -216,6 +216,7 @@ def test_findings_about_a_cell_come_all_at_once_each_with_its_line(
     assert (reported["status"], reported["exit"], reported["errors"]) == ("error", 2, lines)
 
 
+@pytest.mark.slow
 def test_plots_are_vector_pictures_unless_others_are_requested(
     hasty_pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -33,6 +33,7 @@ def solved(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
     return err
 
 
+@pytest.mark.slow
 def test_a_transfer_that_is_not_found_has_a_name_a_pair_an_amount_and_a_page(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -89,7 +89,7 @@ def test_a_circle_of_tasks_after_one_another_is_refused_when_the_file_is_read(tm
         text = text.replace(f"  {task}:\n", f"  {task}:\n    after: [{before}]\n", 1)
     (tmp_path / "cell.yaml").write_text(text)
 
-    with pytest.raises(InputError, match=r"after: expected rules that some order keeps, .* 'edge_1'") as refused:
+    with pytest.raises(InputError, match=r"after: expected an order that can be worked off, .* 'edge_1'") as refused:
         load_open_cell(tmp_path / "cell.yaml")
     assert len(str(refused.value).splitlines()) == 1
 

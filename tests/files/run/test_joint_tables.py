@@ -230,6 +230,7 @@ def test_table_without_two_rows_is_refused() -> None:
         parse_table("\n".join(TEXT.split("\n")[:-5]) + "\n", "t.csv")
 
 
+@pytest.mark.slow
 @given(st.integers(0, len(TEXT) - 1), st.characters(codec="utf-8"))
 def test_one_wrong_character_never_passes_as_another_shape(position: int, char: str) -> None:
     """Any single damage either is refused by name or still gives a whole, finite table."""

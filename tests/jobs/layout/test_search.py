@@ -86,6 +86,7 @@ def test_the_cycle_is_the_shortest_of_this_motion(searched: LayoutResult, folder
     assert not solve(faster).passed
 
 
+@pytest.mark.slow
 def test_a_given_layout_that_is_not_beaten_is_the_result(
     searched: LayoutResult, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

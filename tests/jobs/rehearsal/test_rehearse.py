@@ -42,6 +42,7 @@ def largest(errors):
     return float(np.linalg.norm(errors.position_error, axis=1).max())
 
 
+@pytest.mark.slow
 def test_an_exact_cell_shows_the_errors_of_the_program_and_nothing_else(pair):
     (run,) = rehearse(pair, CellErrors()).runs
 

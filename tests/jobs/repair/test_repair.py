@@ -32,6 +32,7 @@ def too_near(sound: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Rep
     return repaired, folder
 
 
+@pytest.mark.slow
 def test_the_least_change_is_straight_down_by_what_is_missed(too_near: tuple[Repair, Path]) -> None:
     record = too_near[0].record
     assert record["status"] == "repaired"

@@ -30,6 +30,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_figures_are_those_of_a_plain_solve(study: Path) -> None:
     record = json.loads((study / "study.json").read_text())
     cell = load_cell(CELL).with_values(dict(map(read_setting, (*SLOW, "motion.duration_s=2"))))

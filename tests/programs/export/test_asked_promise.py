@@ -38,6 +38,7 @@ def export(folder: Path, *options: str) -> tuple[int, str, str]:
     return run_command(f"cellplan export run --cell cell.yaml {' '.join(options)}", folder)
 
 
+@pytest.mark.slow
 def test_a_timed_program_is_not_for_robots_that_wait(run: VerifiedRun) -> None:
     promise = choose_promise(run, URSCRIPT, ("right",))
 

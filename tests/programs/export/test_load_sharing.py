@@ -107,6 +107,7 @@ def of_grip(judgement: Judgement, unit: str) -> float:
     )
 
 
+@pytest.mark.slow
 def test_the_grip_keeps_its_place_in_all_rows_of_a_run(run: VerifiedRun) -> None:
     (full,) = full_rows(run)
 

@@ -109,6 +109,7 @@ def test_other_cycles_are_refused() -> None:
         render_urscript(timed(cycle=0.004))
 
 
+@pytest.mark.slow
 def test_long_programs_have_several_routines_and_say_that_nobody_has_tried_one() -> None:
     cell = ur_cell(cycle=0.002)
     long = job_of(cell, smooth_program(cell, cycle=0.002, end=60.0), promise=Promise.TIMED)

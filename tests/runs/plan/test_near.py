@@ -96,6 +96,7 @@ def test_a_holder_near_its_grasp_is_moved_onto_it(cells: Path) -> None:
     assert abs(moved.moved) == pytest.approx(np.radians(1.0), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_same_cell_near_its_run_is_the_same_program(earlier: Path, tmp_path: Path) -> None:
     assert (
         run(["solve", str(earlier.parent / "cell.yaml"), "--near", str(earlier), "-o", str(tmp_path / "r"), "-q"]) == 0

@@ -33,6 +33,7 @@ def problem(ready: PreparedSearch) -> ProgramProblem:
     return ready.coarse
 
 
+@pytest.mark.slow
 def test_another_grasp_moves_the_holder_as_a_plan_does(ready: PreparedSearch, problem: ProgramProblem) -> None:
     x = problem.given + CHANGE
     point = problem.evaluate(x, ready.given_start)

@@ -121,4 +121,6 @@ def _circles(valid: ValidEntries, program: ProgramEntry, document: YamlDocument)
         if path is not None:  # one of given orders is named where blocks are made
             words = " before ".join(f"'{name}'" for name in reversed(circle))
             text = f"expected rules that some order keeps, with after and the orders of the robots, got {words}"
+            if path[0] == "tasks":
+                text = f"expected an order that can be worked off, got a circle: {words}: change after"
             yield document.finding(path, text)

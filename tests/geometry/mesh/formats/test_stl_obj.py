@@ -69,6 +69,7 @@ def test_a_binary_stl_that_starts_with_solid_is_read_as_binary(tmp_path: Path) -
     assert len(read_mesh(path).faces) == 12
 
 
+@pytest.mark.slow
 def test_real_collision_meshes_agree_with_another_reader(shared_robots: Path) -> None:
     files = sorted(shared_robots.glob("*/meshes/*/*.stl"))
     assert len(files) > 50

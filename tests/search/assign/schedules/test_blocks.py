@@ -106,7 +106,11 @@ def test_the_model_is_as_good_as_enumeration(seed: int, chained: bool) -> None:
     assert answer.bound == model_cycle(instance, answer.schedule) == best_by_enumeration(instance)
 
 
-@pytest.mark.parametrize("rules", [TaskRules(), TaskRules(together=(("t0", "t1"),))], ids=["free", "together"])
+@pytest.mark.parametrize(
+    "rules",
+    [pytest.param(TaskRules(), marks=pytest.mark.slow), TaskRules(together=(("t0", "t1"),))],
+    ids=["free", "together"],
+)
 def test_with_moving_parts_the_model_is_as_good_as_enumeration_and_some_columns_pay(rules: TaskRules) -> None:
     """Columns are blocks of one or two tasks that begin and end at different configurations of the holder."""
     pytest.importorskip("ortools")
