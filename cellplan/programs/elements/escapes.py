@@ -174,6 +174,19 @@ def register_of(frame: ExportFrame, robot: str) -> str:
     return stated.zfill(len(usual)) if usual.startswith("0") else stated
 
 
+def require_registers_apart(frame: ExportFrame, robot: str, count: int) -> None:
+    """Refuse a number that is less than ``count`` from that of a robot of the same controller, as each uses so many."""
+    register, control = register_of(frame, robot), frame.robot(robot).control
+    for other in frame.robots[: frame.robots.index(robot)]:
+        at, beside = register_of(frame, other), frame.robot(other).control
+        is_shared = control is not None and beside is not None and control.id == beside.id
+        if is_shared and at.isdecimal() and abs(int(at) - int(register)) < count:
+            raise InputError(
+                f"robots.{robot}.controller.step_register: expected one {count} or more from that of '{other}' on the "
+                f"same controller, {at}, as both use as many, got '{register}'"
+            )
+
+
 def with_register(dialect: Dialect, form: EscapeForm) -> Dialect:
     """A format whose programs set their step register at each mark, and whose reader expects just that."""
 

@@ -190,3 +190,22 @@ def test_what_no_job_counts_is_refused(job: ExportJob, changes: dict[str, object
     findings = refusals(*with_register(INFORM, INFORM_ESCAPE).demands(changed, 0))
 
     assert any(words in str(finding) for finding in findings)
+
+
+@pytest.mark.parametrize(("register", "is_right"), [(None, False), (84, False), (85, True), (77, True)])
+def test_variables_of_two_robots_of_a_controller_do_not_overlap(
+    job: ExportJob, register: int | None, is_right: bool
+) -> None:
+    one, other = job.frame.cell.robots
+    assert one.control is not None
+    assert other.control is not None
+    stated = {"id": one.control.id, "step_register": register}
+    robots = (one, replace(other, control=other.control.model_copy(update=stated)))  # the first with D081 to D084
+    frame = replace(job.frame, cell=replace(job.frame.cell, robots=robots))
+
+    said = [str(finding) for finding in refusals(*with_register(INFORM, INFORM_ESCAPE).demands(frame, 0))]
+
+    wanted = (
+        f"robots.beta.controller.step_register: expected one 4 or more from that of '{ROBOT}' on the same controller"
+    )
+    assert any(text.startswith(wanted) for text in said) is not is_right

@@ -11,7 +11,7 @@ from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame
-from cellplan.programs.elements.escapes import SPEED, EscapeForm, EscapeProgram, register_of
+from cellplan.programs.elements.escapes import SPEED, EscapeForm, EscapeProgram, register_of, require_registers_apart
 from cellplan.programs.elements.joints import Angle, to_numbers
 from cellplan.programs.elements.text import comment
 from cellplan.programs.elements.timed_rows import decimals_of
@@ -109,17 +109,10 @@ def _sources(frame: ExportFrame, robot: str) -> str:
 def _require(frame: ExportFrame, robot: str) -> None:
     """Refuse a register that has no such number, and names to which nothing can be added."""
     register, name = register_of(frame, robot), _name(frame, robot)
-    key = f"robots.{robot}.controller.step_register"
     if not register.isdecimal() or not 1 <= int(register) <= LAST:
+        key = f"robots.{robot}.controller.step_register"
         raise InputError(f"{key}: expected the number of a register, 1 to {LAST}, got '{register}'")
-    for other in frame.robots[: frame.robots.index(robot)]:
-        at, both = register_of(frame, other), [frame.robot(name).control for name in (robot, other)]
-        is_shared = len({control and control.id for control in both}) == 1 and None not in both
-        if is_shared and at.isdecimal() and abs(int(at) - int(register)) < COUNT:
-            raise InputError(
-                f"{key}: expected one {COUNT} or more from that of '{other}' on the same controller, {at}, as both use "
-                f"as many, got '{register}'"
-            )
+    require_registers_apart(frame, robot, COUNT)
     if len(name) > LONGEST:
         raise InputError(f"robots.{robot}: expected a name of at most {LONGEST} characters for --escape, got '{name}'")
 

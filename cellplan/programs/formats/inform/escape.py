@@ -16,7 +16,14 @@ from cellplan.errors import InputError
 from cellplan.geometry.transforms import inverse
 from cellplan.model.report.exported import ExportFrame, Promise
 from cellplan.model.units import MM
-from cellplan.programs.elements.escapes import SPEED, EscapeForm, EscapeProgram, EscapeStep, register_of
+from cellplan.programs.elements.escapes import (
+    SPEED,
+    EscapeForm,
+    EscapeProgram,
+    EscapeStep,
+    register_of,
+    require_registers_apart,
+)
 from cellplan.programs.elements.joints import Angle
 from cellplan.programs.elements.text import ascii_text, comment
 from cellplan.programs.elements.timed_rows import decimals_of
@@ -26,7 +33,8 @@ from cellplan.programs.formats.inform.text import COMMENT, read_job
 from cellplan.programs.formats.inform.writer import INFORM, Job
 
 UNIT: Final = 1000  # of the register from mark to mark; more rows between two are refused
-LAST: Final = 96  # register: three variables behind it are used too, and controllers have 100
+LAST: Final = 96  # register: controllers have 100 variables
+COUNT: Final = 4  # variables of an escape program
 BOX: Final = 1.0  # [mm] by which a box is larger than what the tool passes
 SAMPLES: Final = 33  # places of a motion of joints, between which the tool is off their chord by less than their gap
 WORDS: Final = 1000.0  # of a millimetre in the elements of a position variable
@@ -148,6 +156,7 @@ def _require(frame: ExportFrame, robot: str) -> None:
     if not re.fullmatch(r"[0-9]{1,3}", register) or int(register) > LAST:
         key = f"robots.{robot}.controller.step_register"
         raise InputError(f"{key}: expected the number of a variable D, 0 to {LAST}, got '{register}'")
+    require_registers_apart(frame, robot, COUNT)
     if len(name) > LONGEST_NAME - len("_MEET"):
         raise InputError(f"robots.{robot}: expected a shorter name for --escape, got '{name}'")
 
