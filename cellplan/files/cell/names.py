@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from cellplan.files.cell.changes import changed
-from cellplan.files.input.findings import KeyPath, key_text, listed, raise_findings, shown
+from cellplan.files.input.findings import KeyPath, did_you_mean, key_text, listed, raise_findings, shown_whole
 from cellplan.files.yaml.reader import YamlDocument, read_yaml
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 
@@ -34,8 +34,10 @@ def with_stated_names(document: YamlDocument, file: Path) -> YamlDocument:
         if is_name(path) and _at(document.root, path[:2]) is not None:
             names[key_text(path)] = value
         elif value != known:
-            text = f"expected {shown(known)} as in '{document.file}', got {shown(value)}; without solving again only"
-            findings.append(stated.key_finding(path, f"{text} names of controllers may change ({listed(NAMES)})"))
+            hint = "" if known else did_you_mean(str(path[-1]), NAMES)
+            text = f"expected {shown_whole(known)} as in '{document.file}', got {shown_whole(value)}{hint}; without"
+            text += f" solving again only names of controllers may change ({listed(NAMES)})"
+            findings.append(stated.key_finding(path, text))
     raise_findings(stated.file, findings)
     lines = stated.lines()
     return changed(document, names, {key: f"{stated.file}:{lines[key]}" for key in names})

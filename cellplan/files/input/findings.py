@@ -94,6 +94,11 @@ def listed(words: Iterable[str]) -> str:
     return ", ".join(words[:LISTED_LIMIT]) + more or "none"
 
 
+def shown_whole(value: object) -> str:
+    """A value beside another of its kind: as ``shown`` has it, a list with all of its elements."""
+    return f"[{', '.join(map(shown_whole, value))}]" if isinstance(value, tuple | list) else shown(value)
+
+
 def shown(value: object) -> str:
     """A value found in a file as a message repeats it: short, on one line, plain characters only."""
     if value is None:

@@ -10,7 +10,7 @@ from cellplan.files.cell.load import load_cell, with_names
 from cellplan.files.cell.names import is_name
 from cellplan.files.cell.write import written_document
 from cellplan.files.input.files import digest_of_file
-from cellplan.files.input.findings import KeyPath, key_text, listed, shown
+from cellplan.files.input.findings import KeyPath, key_text, listed, shown, shown_whole
 from cellplan.files.robots.joint_table import load_bundled_table
 from cellplan.files.run.manifest import BUNDLED
 from cellplan.files.run.stored import CELL, StoredRun
@@ -81,13 +81,16 @@ def _with_file(stored: StoredRun, cell: Path, allow_dirs: Sequence[Path]) -> tup
     others = [difference for difference in differences if not (stale and is_name(difference[0]))]
     if stale and (others or not differences):
         details = [
-            f"{original.origin.at(key_text(path))}: expected {shown(then)}, with which the run was made, got "
-            f"{shown(now)}; solve the cell again"
+            f"{original.origin.at(key_text(path))}: expected {shown_whole(then)}, with which the run was made, got "
+            f"{shown_whole(now)}; solve the cell again"
             for path, now, then in others[:MOST]
         ]
         _refuse(stored, stale, details)
     if others:
-        lines = (f"{key_text(key)}: expected {shown(old)} as in '{cell}', got {shown(new)}" for key, old, new in others)
+        lines = (
+            f"{key_text(key)}: expected {shown_whole(old)} as in '{cell}', got {shown_whole(new)}"
+            for key, old, new in others
+        )
         raise InvalidFileError([InputError(f"{stored.folder / CELL}: {line}") for line in lines])
     remarks = tuple(f"{_change(address, value)} when the cell was solved" for address, value in changes.items())
     compared = tuple(name for name in now if name not in stale)

@@ -273,7 +273,15 @@ def has_value(address: str) -> bool:
         ("robots: {left: {base: {x: 1}}}", ":1: robots.left.base.x: expected nothing as in '{cell}', got 1; "),
         (
             "robots:\n  left: {controller: {tools: 3}}",
-            ":2: robots.left.controller.tools: expected nothing as in '{cell}'",
+            ":2: robots.left.controller.tools: expected nothing as in '{cell}', got 3; ",
+        ),
+        (
+            "robots: {left: {controller: {taskk: T}}}",
+            ":1: robots.left.controller.taskk: expected nothing as in '{cell}', got 'T', did you mean 'task'?; ",
+        ),
+        (
+            "robots: {left: {base: {xyz_mm: [1, 2]}}}",
+            ":1: robots.left.base.xyz_mm: expected nothing as in '{cell}', got [1, 2]; ",
         ),
         (
             "robots:\n  left: {controller: {task: T_9}}",

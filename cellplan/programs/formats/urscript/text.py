@@ -31,7 +31,9 @@ ENDING: Final = ".script"
 _WORDS: Final = (
     "and or xor not if elif else end while for def thread return break continue global local struct pass halt sec "
     "True False PI movej movel movep movec servoj servoc speedj speedl stopj stopl sync sleep join kill run "
-    "set_standard_digital_out get_standard_digital_in"
+    "set_standard_digital_out get_standard_digital_in switch case default in is popup textmsg norm length sin cos tan "
+    "asin acos atan atan2 sqrt log pow floor ceil random d2r r2d force freedrive_mode set_tcp set_payload set_gravity "
+    "pose_add pose_sub pose_trans pose_inv pose_dist point_dist interpolate_pose get_actual_tcp_pose str_len"
 )
 RESERVED: Final = (*_WORDS.split(), *(f"page_{number:03d}" for number in range(1, MOST_PAGES + 1)))
 
