@@ -178,8 +178,8 @@ def require_registers_apart(frame: ExportFrame, robot: str, count: int) -> None:
     """Refuse a number that is less than ``count`` from that of a robot of the same controller, as each uses so many."""
     register, control = register_of(frame, robot), frame.robot(robot).control
     for other in frame.robots[: frame.robots.index(robot)]:
-        at, beside = register_of(frame, other), frame.robot(other).control
-        is_shared = control is not None and beside is not None and control.id == beside.id
+        at, other_control = register_of(frame, other), frame.robot(other).control
+        is_shared = control is not None and other_control is not None and control.id == other_control.id
         if is_shared and at.isdecimal() and abs(int(at) - int(register)) < count:
             raise InputError(
                 f"robots.{robot}.controller.step_register: expected one {count} or more from that of '{other}' on the "
