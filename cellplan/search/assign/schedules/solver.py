@@ -11,7 +11,7 @@ import numpy as np
 from cellplan.cache import keep, key_of, recall
 from cellplan.geometry.arrays import Indices
 
-WORKERS: Final = 8  # searches that take turns; their number decides the answer, not the number of processors
+WORKERS: Final = 4  # searches that take turns; their number decides the answer, not the number of processors
 POOL: Final = 24  # answers that are known at the end
 ROUNDING: Final = 1e-6  # [steps] of a bound
 LISTENING: Final = 0.5  # [s] from one look for the end of a search to the next; it ends no search
