@@ -29,7 +29,7 @@ from cellplan.programs.elements.handshake import (
     speakers,
     task_group,
 )
-from cellplan.programs.elements.joints import Angle, Axes, from_numbers, unit_of
+from cellplan.programs.elements.joints import Angle, Axes, from_numbers, on_one_controller, unit_of
 from cellplan.programs.elements.paced import Events
 
 REGISTER: Final = "cell_step"  # name of a step register where the cell states none
@@ -176,10 +176,9 @@ def register_of(frame: ExportFrame, robot: str) -> str:
 
 def require_registers_apart(frame: ExportFrame, robot: str, count: int) -> None:
     """Refuse a number that is less than ``count`` from that of a robot of the same controller, as each uses so many."""
-    register, control = register_of(frame, robot), frame.robot(robot).control
+    register = register_of(frame, robot)
     for other in frame.robots[: frame.robots.index(robot)]:
-        at, other_control = register_of(frame, other), frame.robot(other).control
-        is_shared = control is not None and other_control is not None and control.id == other_control.id
+        at, is_shared = register_of(frame, other), on_one_controller(frame.robot(robot), frame.robot(other))
         if is_shared and at.isdecimal() and abs(int(at) - int(register)) < count:
             raise InputError(
                 f"robots.{robot}.controller.step_register: expected one {count} or more from that of '{other}' on the "

@@ -41,6 +41,11 @@ class Axes:
         return cls(arm=tuple(range(first, count)), external=tuple(range(first)))
 
 
+def on_one_controller(one: Robot, other: Robot) -> bool:
+    """Whether two robots are connected to the same controller."""
+    return one.control is not None and other.control is not None and one.control.id == other.control.id
+
+
 def unit_of(cell: Cell, robot: str) -> tuple[str, ...]:
     """A robot and those whose axes one program moves in step with it, the arm first; as a rule itself alone.
 
@@ -50,7 +55,7 @@ def unit_of(cell: Cell, robot: str) -> tuple[str, ...]:
     controller = None if control is None else cell.controllers.get(control.id)
     if control is None or controller is None or controller.kind != "kuka":
         return (robot,)
-    others = [one for one in cell.robots if one.control is not None and one.control.id == control.id]
+    others = [one for one in cell.robots if on_one_controller(one, cell.robot(robot))]
     arms = [one.name for one in others if Axes.of(one).arm]
     return (*arms, *(one.name for one in others if one.name not in arms)) if len(arms) == 1 else (robot,)
 

@@ -92,7 +92,7 @@ def judge(
     return Judgement(
         findings=tuple(dict.fromkeys(findings)),
         deviations=_largest(deviations),
-        not_judged=tuple(_notjudged_stretches(dialect, job, read)),
+        not_judged=tuple(_not_judged(dialect, job, read)),
         corners=_largest(corners),
         rounded=_rounded(job, read),
         executed=executed,
@@ -268,7 +268,7 @@ def _largest(deviations: Iterable[Deviation]) -> tuple[Deviation, ...]:
     return tuple(largest_of(deviations, lambda deviation: (deviation.subject, deviation.unit)))
 
 
-def _notjudged_stretches(dialect: Dialect, job: ExportJob, read: Sequence[ProgramRows]) -> Iterator[str]:
+def _not_judged(dialect: Dialect, job: ExportJob, read: Sequence[ProgramRows]) -> Iterator[str]:
     """What holds of the run but not of the files alone."""
     if job.frame.promise is Promise.PACED:
         yield "accelerations, and speeds and loads off the seams: the controllers choose their own"

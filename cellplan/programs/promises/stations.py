@@ -18,7 +18,7 @@ from cellplan.model.report.exported import Station
 from cellplan.model.report.verified_run import ReadRun, VerifiedRun
 from cellplan.model.task.task import Frame, Task
 from cellplan.programs.elements.frames import controller_base, on_flange
-from cellplan.programs.elements.joints import unit_of
+from cellplan.programs.elements.joints import on_one_controller, unit_of
 from cellplan.programs.promises.run_programs import run_programs
 from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.scene.kinematics.screw_chain import ScrewChain
@@ -56,15 +56,11 @@ def _station(cell: Cell, task: Task, q: Array) -> Station:
     farthest = np.argmax(np.abs(X_WP - X_WP[0]).max(axis=(1, 2)))
     is_at_rest = _is_same(X_WP[0], X_WP[farthest])
     is_fixed = is_at_rest and _kind(cell, robot) in FIXED and holder.name not in unit_of(cell, robot.name)
-    if _is_on_one_controller(holder, robot) and not is_fixed:
+    if on_one_controller(holder, robot) and not is_fixed:
         return Station(tasks=(task.name,), holder=holder.name, X=on_flange(holder, holder.tool.X_FT @ part.X_CP))
     if not is_at_rest:
         return Station(tasks=(task.name,))
     return Station(tasks=(task.name,), X=inverse(controller_base(robot)) @ X_WP[0], X_W=X_WP[0])
-
-
-def _is_on_one_controller(one: Robot, other: Robot) -> bool:
-    return one.control is not None and other.control is not None and one.control.id == other.control.id
 
 
 def _kind(cell: Cell, robot: Robot) -> str | None:

@@ -20,11 +20,6 @@ def played_robots(frame: ExportFrame) -> ExportFrame:
     return replace(frame, robots=tuple(name for name in frame.robots if name == unit_of(frame.cell, name)[0]))
 
 
-def moved_robots(frame: ExportFrame, robot: str) -> tuple[str, ...]:
-    """Robots whose axes stand in the points of a robot's program: itself first."""
-    return unit_of(frame.cell, robot)
-
-
 def order_of_axes(frame: ExportFrame, robot: str) -> list[int]:
     """Places of the joints of a robot in the order of a point: its arm, then its external axes."""
     axes = Axes.of(frame.robot(robot))
@@ -33,7 +28,7 @@ def order_of_axes(frame: ExportFrame, robot: str) -> list[int]:
 
 def external_axes(frame: ExportFrame, robot: str) -> int:
     """Number of external axes in the points of a robot's program: those before its arm, then those of other robots."""
-    others = moved_robots(frame, robot)[1:]
+    others = unit_of(frame.cell, robot)[1:]
     return len(Axes.of(frame.robot(robot)).external) + sum(len(order_of_axes(frame, name)) for name in others)
 
 
@@ -44,14 +39,14 @@ def demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
         yield partial(require_six_axes, frame.robot(robot), external=EXTERNAL, what="KRL")
         yield partial(_require_places, frame, robot)
         for station in frame.stations.get(robot, ()):
-            if station.holder not in moved_robots(frame, robot):
+            if station.holder not in unit_of(frame.cell, robot):
                 yield partial(require_rest, robot, station)
         is_in_step = frame.promise is Promise.SYNCHRONISED and frame.moves is not Moves.JOINTS
         if frame.promise is Promise.PACED or is_in_step:
             placed = frame.robot(robot)
             yield partial(status_and_turn, placed, np.zeros((1, len(placed.model.joints))))
             for grasp in frame.cell.part.held_by[:1] if frame.moves is Moves.LINEAR else ():
-                if grasp.robot in moved_robots(frame, robot)[1:]:
+                if grasp.robot in unit_of(frame.cell, robot)[1:]:
                     yield partial(machine_of, frame, grasp.robot)
 
 
@@ -68,7 +63,7 @@ def machine_of(frame: ExportFrame, positioner: str) -> int:
 
 def _require_places(frame: ExportFrame, arm: str) -> None:
     """Refuse more external axes than a point holds, and an arm without the positioners that its points move."""
-    for name in moved_robots(frame, arm):
+    for name in unit_of(frame.cell, arm):
         if name not in frame.robots:
             raise InputError(f"--robot: expected '{name}' too, whose axes stand in the points of '{arm}', got none")
     count = external_axes(frame, arm)

@@ -9,10 +9,10 @@ import numpy as np
 
 from cellplan.model.report.exported import ExportFrame, ProgramRows, Promise, RobotRows
 from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step
-from cellplan.programs.elements.joints import from_numbers
+from cellplan.programs.elements.joints import from_numbers, unit_of
 from cellplan.programs.elements.pages import read_programs
 from cellplan.programs.elements.text import Statement
-from cellplan.programs.formats.krl.axes import moved_robots, order_of_axes
+from cellplan.programs.formats.krl.axes import order_of_axes
 from cellplan.programs.formats.krl.text import WHOLE, KrlModule, read_module
 
 MOST_ADVANCE: Final = 5  # motions that a controller can read ahead
@@ -33,7 +33,7 @@ def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> It
     """Rows of the model from the numbers of the points; takes the files of one robot out of those that are left."""
     player = _played(frame, robot, left, path)
     numbers, first = np.array(player.rows, dtype=np.float64), 0
-    for name in moved_robots(frame, robot):
+    for name in unit_of(frame.cell, robot):
         order = order_of_axes(frame, name)
         written = np.zeros((len(numbers), len(order)))
         written[:, order] = numbers[:, first : first + len(order)]
@@ -202,7 +202,7 @@ class _KrlPlayer:
     def _values(self, module: KrlModule, name: str) -> Sequence[float]:
         """Components of a point, as many as the robot has axes; unused external ones have to be at zero."""
         values = module.points[name]
-        count = sum(len(order_of_axes(self.frame, robot)) for robot in moved_robots(self.frame, self.robot))
+        count = sum(len(order_of_axes(self.frame, robot)) for robot in unit_of(self.frame.cell, self.robot))
         if any(map(isnan, values[:count])) or any(value != 0.0 and not isnan(value) for value in values[count:]):
             expected = f"values for the {count} axes of the robot and for no other"
             raise module.lines[name].error(expected, name.upper())

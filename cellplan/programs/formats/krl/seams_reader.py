@@ -11,11 +11,11 @@ from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.report.exported import ExportFrame, ProgramRows, RobotRows
 from cellplan.model.units import MM
-from cellplan.programs.elements.joints import Axes, from_numbers
+from cellplan.programs.elements.joints import Axes, from_numbers, unit_of
 from cellplan.programs.elements.paced import Events, ReadMove, Which, rows_of_moves
 from cellplan.programs.elements.pages import read_programs
 from cellplan.programs.elements.text import Statement
-from cellplan.programs.formats.krl.axes import external_axes, moved_robots, order_of_axes
+from cellplan.programs.formats.krl.axes import external_axes, order_of_axes
 from cellplan.programs.formats.krl.poses import KrlPose, read_pose
 from cellplan.programs.formats.krl.seams import (
     MODES,
@@ -314,7 +314,7 @@ class _Player:
             raise end.error("at least one motion", "none")
         arm = rows_of_moves(self.events, self.moves, self.between)
         written, robots, first = np.array(self.positioners), [arm], 0
-        for name in moved_robots(self.frame, self.robot)[1:]:
+        for name in unit_of(self.frame.cell, self.robot)[1:]:
             order = order_of_axes(self.frame, name)
             numbers = np.zeros((len(written), len(order)))
             numbers[:, order] = written[:, first : first + len(order)]

@@ -13,6 +13,7 @@ from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, Moves, ProgramRows, Promise
 from cellplan.programs.elements.corners import LARGEST_SHARE, moves, row_shares
 from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.joints import unit_of
 from cellplan.programs.elements.paced import moves_of
 from cellplan.programs.elements.pages import (
     PagedProgram,
@@ -23,7 +24,7 @@ from cellplan.programs.elements.pages import (
     shares_as_written,
 )
 from cellplan.programs.elements.text import comment, joined, point_stems
-from cellplan.programs.formats.krl.axes import demands, moved_robots, order_of_axes, played_robots
+from cellplan.programs.formats.krl.axes import demands, order_of_axes, played_robots
 from cellplan.programs.formats.krl.poses import components, status_and_turn
 from cellplan.programs.formats.krl.reader import read_krl
 from cellplan.programs.formats.krl.seams import (
@@ -57,7 +58,7 @@ def render_krl(job: ExportJob) -> dict[str, str]:
     by_name = {program.name: program for program in job.programs}
     for (name, robot), path in paths.items():
         require_rows(job, by_name[name])
-        program = _moved_together(job, by_name[name], moved_robots(job.frame, robot), path)
+        program = _moved_together(job, by_name[name], unit_of(job.frame.cell, robot), path)
         files |= _with_seams(job, by_name[name], program) if KRL.has_seams(job.frame) else _modules(program)
     return files
 

@@ -12,7 +12,7 @@ from cellplan.model.settings.controllers import RobotControlEntry
 from cellplan.model.task.task import Frame
 from cellplan.programs.elements.frames import on_flange
 from cellplan.programs.elements.handshake import MEETINGS, task_group
-from cellplan.programs.elements.joints import Axes
+from cellplan.programs.elements.joints import Axes, on_one_controller
 from cellplan.programs.elements.text import safe_names
 from cellplan.programs.elements.timed_rows import decimals_of
 
@@ -190,7 +190,6 @@ def require_one_controller(frame: ExportFrame) -> None:
 
 def storage(frame: ExportFrame, robot: str) -> str:
     """How work objects of a robot are stored: for its task alone where other tasks of the controller have some too."""
-    working = [frame.robot(name).control for name in {task.robot for task in frame.cell.tasks} - {robot}]
-    control = frame.robot(robot).control
-    is_shared = any(other is not None and control is not None and other.id == control.id for other in working)
+    others = {task.robot for task in frame.cell.tasks} - {robot}
+    is_shared = any(on_one_controller(frame.robot(robot), frame.robot(other)) for other in others)
     return "TASK PERS" if is_shared else "PERS"
