@@ -1,6 +1,6 @@
 """Lines that bodies refuse: tasks whose tools come through by joints only."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from cellplan.cache import without_cache
 from cellplan.model.report.exported import ExportJob, ProgramRows
@@ -28,39 +28,30 @@ def refused_lines(
     """
     refused: dict[str, str] = {}
     with without_cache():
-        played = played_programs(shared.run, dialect, job, executed, lead=0.0)
-        for place, program in enumerate(played):
-            lines = _by_clearance(program, shared, refused)
-            if orders and not refused:
-                _by_orders(program, shared, lines, (orders[place], executed[place]), refused)
+        for place, program in enumerate(played_programs(shared.run, dialect, job, executed, lead=0.0)):
+            marked = (orders[place], executed[place]) if orders and not refused else None
+            for task, reason in _reasons(program, shared, marked):
+                refused.setdefault(task, reason)
     return refused
 
 
-def _by_clearance(program: ExecutedProgram, shared: Shared, refused: dict[str, str]) -> dict[int, list[Task]]:
-    """Add what refuses lines on the clock of the rows; the tasks that have lines, by the place of their phase."""
-    lines: dict[int, list[Task]] = {}
+def _reasons(
+    program: ExecutedProgram, shared: Shared, marked: tuple[Orders, ProgramRows] | None
+) -> Iterator[tuple[str, str]]:
+    """Names of tasks and what refuses their lines: on the clock of the rows, or else between marks in another order."""
+    lines, is_clear = dict[int, list[Task]](), True
     for stretch in judged_stretches(program):
         rows = path_rows(program, stretch, shared)
         tasks = [scheduled.task for scheduled in rows.schedule.tasks if len(line_steps(rows, scheduled.task))]
         lines[stretch.place] = tasks
         for finding in clearance_findings(rows) if tasks else ():
+            is_clear = False
             for task in [task for task in tasks if task.robot in finding.robots] or tasks:
-                refused.setdefault(task.name, place_on_seam(rows, task, finding.at_s) + finding.text)
-    return lines
-
-
-def _by_orders(
-    program: ExecutedProgram,
-    shared: Shared,
-    lines: dict[int, list[Task]],
-    marked: tuple[Orders, ProgramRows],
-    refused: dict[str, str],
-) -> None:
-    """Add what refuses lines in another order of the robots between two marks."""
-    orders, rows = marked
-    blocked = blocked_orders(shared.run, orders, rows, robot_corners(program), known=shared.known_orders)
-    for count, finding in blocked:
-        movers = {robot for pair in orders.stretches[count].pairs for robot in pair}
-        for task in lines.get(orders.stretches[count].place, ()):
-            if task.robot in movers:
-                refused.setdefault(task.name, finding)
+                yield task.name, place_on_seam(rows, task, finding.at_s) + finding.text
+    if marked is None or not is_clear:
+        return
+    orders, read = marked
+    for count, text in blocked_orders(shared.run, orders, read, robot_corners(program), known=shared.known_orders):
+        between = orders.stretches[count]
+        movers = {robot for pair in between.pairs for robot in pair}
+        yield from ((task.name, text) for task in lines.get(between.place, ()) if task.robot in movers)
