@@ -82,13 +82,13 @@ class EscapeForm:
     require: Callable[[ExportFrame, str], None]  # refuses a register that the language does not take
     back: str = ""
     go: str = ""
-    tables: tuple[str, str] = ("", "")  # what a line with the begin of the rows of the program holds, and of those home
+    tables: tuple[str, str] = ("", "")  # what a line with the start of the rows of the program holds, and of those home
     row: str = ""  # pattern of a line with numbers of a row, which are its only group
     # the numbers: of an arm, then of the axes before it
     numbers: Callable[[Robot, str], Sequence[float]] = lambda _robot, _text: ()
     # what a reader of its own finds, where rows do not stand line by line
     read: Callable[[EscapeProgram, Mapping[str, str]], EscapeProgram] | None = None
-    # where no program can tell between which rows an arm stands: begin of motions behind a mark, before each of which
+    # where no program can tell between which rows an arm stands: start of motions behind a mark, before each of which
     # the register is counted up by a statement, and how much more it holds from mark to mark
     counted: tuple[str, str] = ("", "")
     unit: int = 1

@@ -55,18 +55,14 @@ def _station(cell: Cell, task: Task, q: Array) -> Station:
     X_WP = ScrewChain(holder).tool_poses(q[:, cell.columns(holder.name)]) @ part.X_CP
     farthest = np.argmax(np.abs(X_WP - X_WP[0]).max(axis=(1, 2)))
     is_at_rest = _is_same(X_WP[0], X_WP[farthest])
-    is_fixed = is_at_rest and _kind(cell, robot) in FIXED and holder.name not in unit_of(cell, robot.name)
+    controller = None if robot.control is None else cell.controllers.get(robot.control.id)
+    has_fixed = controller is not None and controller.kind in FIXED
+    is_fixed = is_at_rest and has_fixed and holder.name not in unit_of(cell, robot.name)
     if on_one_controller(holder, robot) and not is_fixed:
         return Station(tasks=(task.name,), holder=holder.name, X=on_flange(holder, holder.tool.X_FT @ part.X_CP))
     if not is_at_rest:
         return Station(tasks=(task.name,))
     return Station(tasks=(task.name,), X=inverse(controller_base(robot)) @ X_WP[0], X_W=X_WP[0])
-
-
-def _kind(cell: Cell, robot: Robot) -> str | None:
-    """The kind of the controller of a robot."""
-    controller = None if robot.control is None else cell.controllers.get(robot.control.id)
-    return None if controller is None else controller.kind
 
 
 def _join(known: list[Station], other: Station) -> None:

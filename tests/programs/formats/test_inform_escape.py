@@ -174,7 +174,7 @@ def test_a_robot_goes_back_from_the_row_that_is_counted_and_from_nowhere_else(es
         ({"robots": 1}, "expected motions of joints between marks of several robots with inform, got one robot"),
         ({"step_register": "97"}, "expected the number of a variable D, 0 to 96, got '097'"),
         ({"step_register": "N_STEP"}, "expected the number of a variable D, 0 to 96, got 'N_STEP'"),
-        ({"name": "a" * 28}, "expected a shorter name for --escape"),
+        ({"name": "a" * 28}, "expected a name of at most 27 characters for --escape"),
     ],
 )
 def test_what_no_job_counts_is_refused(job: ExportJob, changes: dict[str, object], words: str) -> None:

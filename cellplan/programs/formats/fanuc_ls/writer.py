@@ -106,9 +106,9 @@ def _stretches(rows: RobotRows) -> list[range]:
 
 
 def _durations(rows: ProgramRows, parts: Sequence[PagedProgram]) -> list[str]:
-    """How each row is approached in step: the first one slowly, all others in whole milliseconds that do not add up.
+    """How each row is approached in step: the first one slowly, all others in whole milliseconds.
 
-    They may where seams, which have no times, are between.
+    What is rounded adds up only where seams, which have no times, are between.
     """
     clock = shared_clock(rows, [part.placed.name for part in parts])
     on_seam = np.any([part.rows.on_seam for part in parts], axis=0)

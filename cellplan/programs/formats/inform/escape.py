@@ -34,6 +34,7 @@ from cellplan.programs.formats.inform.writer import INFORM, Job
 
 UNIT: Final = 1000  # of the register from mark to mark; more rows between two are refused
 LAST: Final = 96  # register: controllers have 100 variables
+LONGEST: Final = LONGEST_NAME - len("_MEET")  # name of a main job, to which those of an escape are named
 COUNT: Final = 4  # variables of an escape program
 BOX: Final = 1.0  # [mm] by which a box is larger than what the tool passes
 SAMPLES: Final = 33  # places of a motion of joints, between which the tool is off their chord by less than their gap
@@ -67,7 +68,8 @@ def _step(program: EscapeProgram, step: EscapeStep, points: Sequence[str]) -> It
     """Statements of a step: which row the register names, whether the tool is there, back, and home."""
     name, number, count = _name(program.frame, program.robot), step.number, step.last - step.first
     if not 0 < count < UNIT:
-        raise InputError(f"--escape: expected 1 to {UNIT - 1} motions between two marks, got {count} of '{name}'")
+        expected = f"expected 1 to {UNIT - 1} motions between two marks, got {count} of '{name}'"
+        raise InputError(f"--escape: {expected}: leave out more (--thin-mm, --thin-deg)")
     meet, places = INFORM_ESCAPE.meet.format(program=name), [*points[step.first - 1 : step.last - 1]]
     yield from (INFORM_ESCAPE.case.format(number=number), INFORM_ESCAPE.agree[number % 2].format(program=name))
     begun = range(count + 1)
@@ -151,14 +153,14 @@ def _require(frame: ExportFrame, robot: str) -> None:
     """Refuse what no job counts, a register that has no such number, and names to which nothing can be added."""
     register, name = register_of(frame, robot), _name(frame, robot)
     if frame.promise is Promise.PACED or len(frame.cell.robots) == 1:
-        got = "lines" if frame.promise is Promise.PACED else "one robot"
+        got = "lines: write joints (--moves joints)" if frame.promise is Promise.PACED else "one robot"
         raise InputError(f"--escape: expected motions of joints between marks of several robots with inform, got {got}")
     if not re.fullmatch(r"[0-9]{1,3}", register) or int(register) > LAST:
         key = f"robots.{robot}.controller.step_register"
         raise InputError(f"{key}: expected the number of a variable D, 0 to {LAST}, got '{register}'")
     require_registers_apart(frame, robot, COUNT)
-    if len(name) > LONGEST_NAME - len("_MEET"):
-        raise InputError(f"robots.{robot}: expected a shorter name for --escape, got '{name}'")
+    if len(name) > LONGEST:
+        raise InputError(f"robots.{robot}: expected a name of at most {LONGEST} characters for --escape, got '{name}'")
 
 
 INFORM_ESCAPE: Final = EscapeForm(

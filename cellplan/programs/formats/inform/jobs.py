@@ -166,13 +166,12 @@ def _require_frames(frame: ExportFrame, robot: Robot) -> None:
 def _require_levels(frame: ExportFrame, robot: Robot, task: Task) -> None:
     """Refuse a closed path in process, of which no single line or arc is made, where no corner can be rounded."""
     is_closed = isinstance(task.path, CirclePath) or task.path.is_closed
-    if robot.control is not None and is_closed and not len(level_radii(frame, robot.name)):
-        form = ProcessForm.of(frame.cell.controllers[robot.control.id])
-        if form is not None:
-            raise InputError(
-                f"controllers.{robot.control.id}.position_levels_mm: expected the distances of PL=1, PL=2 and so on as "
-                f"set on the controller, within which the closed path of '{task.name}' is rounded in process, got none"
-            )
+    has_process = inform_events(frame, robot.name).form is not None
+    if robot.control is not None and is_closed and has_process and not len(level_radii(frame, robot.name)):
+        raise InputError(
+            f"controllers.{robot.control.id}.position_levels_mm: expected the distances of PL=1, PL=2 and so on as "
+            f"set on the controller, within which the closed path of '{task.name}' is rounded in process, got none"
+        )
 
 
 def _require_within(key: str, number: int | None, bounds: tuple[int, int], what: str) -> None:
