@@ -226,7 +226,7 @@ class _SeamRows:
         """Follow the tool on lines and arcs from one row to another, with ends at the corners of its path."""
         self.chosen -= set(range(first + 1, last))
         pieces = list(path.pieces(_piece_ends(path, self.rows, (first, last), corners)))
-        if self.rows.process is not None:
+        if path.smallest_zone and self.rows.process is not None:
             goes_on = self.rows.process & ~switches(self.rows)
             pieces = list(path.divided(pieces, goes_on[first : last + 1]))
         ends = [0, *(piece.last for piece in pieces)]
