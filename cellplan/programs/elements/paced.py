@@ -195,7 +195,7 @@ def moves_of(job: ExportJob, program: ProgramRows, events: Events) -> tuple[Move
 
 
 def _triggers(events: Events, seam: Seam | None, switches: Switches, *, is_tool: bool) -> tuple[str, ...]:
-    """What a move says of outputs that it switches ahead; ``NotVerifiedError`` where it cannot."""
+    """What a move says of outputs that it switches ahead; ``LineRefusedError`` where it cannot."""
     form, texts = events.form, list[str]()
     for on, which in ENDS:
         if seam is None or form is None or not form.entry.lead(on=on) or not (switches.on if on else switches.off):
