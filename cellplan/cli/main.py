@@ -1,4 +1,4 @@
-"""The program ``cellplan``: its commands, and the one place where errors become lines and exit statuses."""
+"""The program ``cellplan``: its commands, examples, and the one place where errors become lines and exit statuses."""
 
 import gc
 import os

@@ -93,8 +93,8 @@ def band(times: Array, low: float, high: float, *, parts: int = BAND_PARTS) -> A
         low: Smallest difference in [s].
 
     Returns:
-        Rectangles, see ``ClockRegion``, shape (R, 4). They reach beyond the band by less than this share of its width
-        or a two-thousandth of the program, whichever is more.
+        Rectangles, see ``ClockRegion``, shape (R, 4). They reach beyond the band by less than one of ``parts`` of its
+        width or a two-thousandth of the program, whichever is more.
     """
     if not low <= high:
         raise ValueError(f"band: expected low <= high, got {low} and {high}")

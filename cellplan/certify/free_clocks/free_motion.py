@@ -34,7 +34,7 @@ class FreeMotion:
         Positions are in [rad] or [m] of each robot, shape (N, n), not necessarily as many rows for each; or of all
         robots, stacked, shape (N, nq).
         """
-        self.scene = scene  # the scene
+        self.scene = scene
         self._q = _by_robot(scene.cell, q)
         self.last = {name: len(rows) - 1 for name, rows in self._q.items()}  # last row of each robot, by name
         bodies = range(len(scene.engine.bodies))

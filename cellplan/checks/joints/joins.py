@@ -19,6 +19,7 @@ def check_joins(cell: Cell, reports: Sequence[Report]) -> Check:
     """The largest acceleration of a joint at a row that two phases share, against its limit.
 
     At such a row the acceleration is the change of velocity from the step before it to the step after it, over a step.
+    Each phase by itself is judged as if joints rested beside it.
 
     Args:
         reports: Reports of the phases of one cycle in their order, each of which begins in the last row of the one

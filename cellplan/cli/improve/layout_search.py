@@ -1,4 +1,4 @@
-"""Searches of ``cellplan layout`` and ``cellplan fastest --free``: request, work, and what came of it."""
+"""Searches of ``cellplan layout`` and ``cellplan fastest --free``: requests and their units, work, and results."""
 
 import math
 import re

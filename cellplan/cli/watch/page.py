@@ -1,4 +1,8 @@
-"""The page beside a run folder that shows its latest result while the cell is watched."""
+"""The page beside a run folder that shows its latest result while the cell is watched.
+
+A page that is opened from disk may not read other files, but it may run scripts that lie beside it: the page runs a
+small script again and again, whose number changes with each round.
+"""
 
 import contextlib
 import json
@@ -65,7 +69,7 @@ def _begin(path: Path) -> str:
 
 
 def watch_page(title: str, *, pages: Sequence[tuple[str, str]], state: str) -> str:
-    """The page as text."""
+    """The page as text: titles and file names of the pages of a run, and of the script of ``state_script``."""
     return template("watch.html").render(title=title, pages=pages, state=state, mark=MARK, message=RELOAD_MESSAGE)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from cellplan.errors import InputError
 from cellplan.files.cell.build.accelerations import acceleration_findings
@@ -97,9 +97,7 @@ class CellFile:
         return _read(replace(self, document=document, changes=changes | plain_values(values), urdfs={}))
 
 
-def load_cell(
-    path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path | None = None, like: Cell | None = None
-) -> Cell:
+def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path | None = None) -> Cell:
     """Read a cell file and everything it names.
 
     Args:
@@ -107,7 +105,6 @@ def load_cell(
         allow_dirs: Folders, beside the cell's own and those that the user allows for every cell, that the files it
             names may lie in.
         folder: The folder that its names start from; None for the one it lies in.
-        like: A cell that was read just before: what it read of the same URDFs is not read again.
 
     Raises:
         InvalidFileError: Everything that is wrong with the cell and the files it names, one located line each.
@@ -116,9 +113,13 @@ def load_cell(
     path = Path(path)
     document = read_yaml(path, file=str(path))
     allowed = tuple(Path(folder) for folder in allow_dirs)
-    source = CellFile(document=document, name=path.name, folder=folder or path.parent, allow_dirs=allowed)
-    known = None if like is None else like.origin.source
-    return _read(replace(source, urdfs=known.urdfs) if isinstance(known, CellFile) else source)
+    return _read(CellFile(document=document, name=path.name, folder=folder or path.parent, allow_dirs=allowed))
+
+
+def load_copy(path: Path, cell: Cell) -> Cell:
+    """A copy of a cell that was just read from its file: the same folders hold, and URDFs are not read again."""
+    source, document = cast("CellFile", cell.origin.source), read_yaml(path, file=str(path))
+    return _read(replace(source, document=document, name=path.name, changes={}))
 
 
 def load_open_cell(

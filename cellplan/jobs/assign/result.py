@@ -20,6 +20,7 @@ from cellplan.report.page.time_line import time_line
 from cellplan.report.plots.palette import robot_colours
 from cellplan.report.record.common import Record, as_json, number
 from cellplan.report.record.rows import Tables, columns_of, flat
+from cellplan.report.text.method import counted
 from cellplan.runs.solution import Run, Solution
 from cellplan.runs.solve import with_verdict
 from cellplan.runs.write_run import versions, write_run
@@ -58,7 +59,7 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
         "left_out": list(assignment.left_out),
         "cycle_time_s": number(cycle),
         "model_cycle_s": number(assignment.model_cycle),
-        "bound_s": None if assignment.bound is None else number(assignment.bound),
+        "bound_s": number(assignment.bound),
         "bound_holds_for": _holds_for(assignment),
         "gap_percent": number(100.0 * (cycle / assignment.bound - 1.0)) if assignment.bound else None,
         "is_proved": assignment.is_proved,
@@ -67,10 +68,7 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
         "blocks": blocks,
         "alternatives": [_alternative(assignment, it) for it in assignment.alternatives],
         "robots": {name: _use(assignment, blocks, waits, name) for name in instance.robots},
-        "not_available": {
-            name: {"cycle_with_s": None if cycle is None else number(cycle)}
-            for name, cycle in assignment.with_more.items()
-        },
+        "not_available": {name: {"cycle_with_s": number(cycle)} for name, cycle in assignment.with_more.items()},
         "only_one_robot": _only_one_robot(instance),
         "part_moves_s": number(step * _part_steps(assignment)),
         "stations": len({station for station, _ in sequenced.stops}),
@@ -90,7 +88,7 @@ def bound_record(bound: AssignmentBound) -> dict[str, Any]:
     return {
         "schema": BOUND_SCHEMA,
         "cell": bound.draft.name,
-        "bound_s": None if steps is None else number(steps * instance.step),
+        "bound_s": number(steps, instance.step),
         "bound_holds_for": OPEN_RESTS if is_open else NO_SOLVER if steps is None else HOLDS_FOR,
         "is_proved": answer.is_proved,
         "blocks": [] if answer.schedule is None else [list(block) for block in answer.schedule.blocks],
@@ -205,7 +203,7 @@ def _use(assignment: Assignment, blocks: Sequence[Record], waits: Mapping[str, R
         "work_s": number(work),
         "use_percent": number(100.0 * work / assignment.cycle),
         "waits_s": waits[robot],
-        "cycle_without_s": None if without is None else number(without),
+        "cycle_without_s": number(without),
     }
 
 
@@ -249,8 +247,7 @@ def assign_lines(record: Record) -> list[str]:
     ]
     for name, use in record["robots"].items():
         busiest = " (busiest)" if name == binding["busiest_robot"] else ""
-        tasks = f"{use['tasks']} task{'s' * (use['tasks'] != 1)}"
-        work = f"{tasks}, {use['work_s']:g} s at work, {use['use_percent']:.3g} %{busiest}"
+        work = f"{counted(use['tasks'], 'task')}, {use['work_s']:g} s at work, {use['use_percent']:.3g} %{busiest}"
         without = "has tasks that no other robot can do"
         if use["cycle_without_s"] is not None:
             without = f"without it about {use['cycle_without_s']:g} s"

@@ -60,7 +60,9 @@ def file_links(
     """Links to the files of a run by what they are.
 
     Args:
+        tables: Names of the joint tables in the run folder.
         plots: Names of the plots in the folder of the page.
+        files: Names of other files in that folder.
         phase: Phase of the page, which lies in a folder of its own; None for the page in the run folder.
     """
     up = _up(phase)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.errors import InputError, InvalidFileError
-from cellplan.files.cell.load import load_cell, with_names
+from cellplan.files.cell.load import load_cell, load_copy, with_names
 from cellplan.files.cell.names import is_name
 from cellplan.files.cell.write import written_document
 from cellplan.files.input.files import digest_of_file
@@ -71,7 +71,7 @@ def _with_file(stored: StoredRun, cell: Path, allow_dirs: Sequence[Path]) -> tup
     stale = _stale(stored, now, where=f"'{cell}'", cell=cell)
     if set(stale) - {manifest.cell_file}:
         _refuse(stored, stale)
-    resolved = _resolved(stored, folder=cell.parent, allow_dirs=allow_dirs, like=original)
+    resolved = _resolved(stored, load_copy(stored.folder / CELL, original))
     seeds = _seeds(stored) if stale else None
     differences = [
         difference
@@ -116,7 +116,7 @@ def _without_file(stored: StoredRun) -> tuple[StoredCell, Cell]:
     now |= {name: _bundled_digest(name) for name in bundled}
     _refuse(stored, _stale(stored, now, where="this version of cellplan"))
     remark = f"the cell file '{manifest.cell_file}' was not compared with the run; name it with --cell"
-    resolved = _resolved(stored, folder=stored.folder, allow_dirs=())
+    resolved = _resolved(stored, load_cell(stored.folder / CELL))
     return StoredCell(cell=resolved, compared=tuple(bundled), remarks=(remark,)), resolved
 
 
@@ -154,10 +154,9 @@ def _refuse(stored: StoredRun, stale: Mapping[str, str], details: Iterable[str] 
         raise InvalidFileError([*map(InputError, lines)])
 
 
-def _resolved(stored: StoredRun, *, folder: Path, allow_dirs: Sequence[Path], like: Cell | None = None) -> Cell:
+def _resolved(stored: StoredRun, cell: Cell) -> Cell:
     """The resolved copy, which must be the file that the manifest names and refer to its inputs."""
     manifest = stored.manifest
-    cell = load_cell(stored.folder / CELL, allow_dirs=allow_dirs, folder=folder, like=like)
     digests = dict(cell.inputs)
     if digests.pop(CELL) != manifest.files[CELL].digest:
         raise InputError(f"{stored.folder / CELL}: changed while it was read")

@@ -38,7 +38,7 @@ def find_homes(
 
     A home keeps the demanded clearance from everything, by the same check that judges the run afterwards, in every run
     in which its robot is idle. One robot after another is placed, in the order of their names; one that finds no extra
-    comes before the others in the next try.
+    comes before the others in the next try. All start postures of the scene are filled in.
 
     Raises:
         HomeNotFoundError: A robot has no such place.
@@ -98,7 +98,7 @@ class _HomeSearch:
     """The search for the home of one robot."""
 
     def __init__(self, scene: Scene, runs: Sequence[PlannedRun], robot: Robot) -> None:
-        """Look up the runs in which the robot is idle."""
+        """Look up the runs in which the robot is idle; the scene has all homes that are known so far."""
         self._cell, self._robot, self._chain = scene.cell, robot, scene.chains[robot.name]
         self._runs = [_idle_run(scene, run, robot.name) for run in runs if robot.name in run.phase.idle]
         picked = [np.unique(np.linspace(0, len(run.q) - 1, TRIED_SAMPLES).astype(int)) for run in self._runs]

@@ -39,7 +39,7 @@ class ProgramClock:
 
     @classmethod
     def of(cls, cell: Cell, plan: Plan, schedules: Sequence[Schedule]) -> Self:
-        """Put the phases of a program one after the other."""
+        """Put the phases of a program, whose plan is on no clock yet, one after the other."""
         steps = [len(schedule.times) - 1 for schedule in schedules]
         first = np.cumsum([0, *(count + gap for count, gap in zip(steps, _gap_steps(plan), strict=True))]).tolist()
         times = np.round(np.arange(first[-1] + 1) * cell.motion.step, TIME_DECIMALS)
@@ -101,7 +101,7 @@ class ProgramClock:
         return np.concatenate([stacked[1:] if skip else stacked for stacked, skip in zip(rows, shared, strict=True)])
 
     def table(self, tasks: Sequence[str]) -> ClockTable:
-        """What happens at each row."""
+        """What happens at each row, with columns for tasks in this order."""
         names = [""] * len(self.times)
         lengths = {task: np.zeros(len(self.times)) for task in tasks}
         for phase, schedule in zip(self.plan.program, self.schedules, strict=True):

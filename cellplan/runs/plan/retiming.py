@@ -104,7 +104,7 @@ class StepErrors:
 def retimed(
     scenes: Sequence[Scene], clock: ProgramClock, motions: Sequence[Motion], *, progress: Progress = silent
 ) -> tuple[ProgramClock, list[Motion]]:
-    """A program and the motions of its phases on the clock that the cell's timing asks for.
+    """A program and the motions of its phases, as their time laws have them, on the clock that the cell asks for.
 
     Returns:
         The same objects where the program runs as it is written.

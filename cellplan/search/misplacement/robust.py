@@ -55,7 +55,7 @@ class Worst:
 
 
 def worst(problem: Guarded, point: Point, demands: Demands, effort: Effort) -> Worst:
-    """The worst displacements of a layout."""
+    """To first order a figure with derivatives g changes by at most sum |g_k| a_k, in the corner of the signs of g."""
     amounts, by = problem.upper, problem.derivatives(point)
     measures = Measures.of(problem, point, demands, effort)
     apart = problem.distance_derivatives(point, measures.distances, by)

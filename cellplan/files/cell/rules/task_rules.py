@@ -17,7 +17,7 @@ Edge = tuple[str, str, KeyPath | None]  # a task, one that is done before it, an
 def task_rule_findings(
     valid: ValidEntries, document: YamlDocument, robots: Mapping[str, Sequence[str]]
 ) -> Iterator[Finding]:
-    """Everything about these rules that contradicts other entries."""
+    """Everything about these rules that contradicts other entries; ``robots`` are those of each open task."""
     program, known = valid.program, valid.names["tasks"]
     if program is None:
         return
@@ -115,12 +115,13 @@ def _circles(valid: ValidEntries, program: ProgramEntry, document: YamlDocument)
         while circle[-1] not in circle[:-1]:
             circle.append(next(name for name in before[circle[-1]] if name in left))
         circle = circle[circle.index(circle[-1]) :]
-        rules = [before[later][one] for later, one in pairwise(circle)]
-        path = ("program", "together") if first else None if None in rules or len(rules) == 1 else rules[0]
-        path = next((place for place in rules if place and place[0] == "program"), path)
-        if path is not None:  # one of given orders is named where blocks are made
-            words = " before ".join(f"'{name}'" for name in reversed(circle))
+        words = " before ".join(f"'{name}'" for name in reversed(circle))
+        places = [place for place in (before[later][one] for later, one in pairwise(circle)) if place is not None]
+        of_program: list[KeyPath] = [place for place in places if place[0] == "program"]
+        of_program += [] if set(first.values()).isdisjoint(circle) else [("program", "together")]
+        if of_program:
             text = f"expected rules that some order keeps, with after and the orders of the robots, got {words}"
-            if path[0] == "tasks":
-                text = f"expected an order that can be worked off, got a circle: {words}: change after"
-            yield document.finding(path, text)
+            yield document.finding(of_program[0], text)
+        elif 1 < len(places) == len(circle) - 1:  # a circle of given orders is named where blocks are made
+            text = f"expected an order that can be worked off, got a circle: {words}: change after"
+            yield document.finding(places[0], text)

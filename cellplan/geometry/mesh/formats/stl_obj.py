@@ -85,11 +85,10 @@ def _parse_stl(data: bytes, name: str) -> Triangles:
     for binary in (data, plain):
         end = _binary_end(binary)
         if end and not binary[end:].strip(PADDING):
-            triangles = np.frombuffer(binary[:end], dtype=STL_TRIANGLE, offset=STL_HEADER)
-            return _loose(triangles["corners"].reshape(-1, 3).astype(np.float64), name)
+            return _loose(np.frombuffer(binary[:end], dtype=STL_TRIANGLE, offset=STL_HEADER)["corners"], name)
     text = plain.rstrip(PADDING)
     if re.match(rb"\s*solid\b", text, re.IGNORECASE) and b"\0" not in text:
-        return _loose(text_numbers(_vertices_of_text_stl(text, name)).reshape(-1, 3), name)
+        return _loose(text_numbers(_vertices_of_text_stl(text, name)).reshape(-1, 3, 3), name)
     if data.startswith(WIDE_MARKS):
         raise InputError(f"{name}: expected a binary or plain text STL file, got text in UTF-16: save it as UTF-8")
     if len(data) < STL_HEADER:
@@ -113,10 +112,10 @@ def _binary_end(data: bytes) -> int:
     return end if len(data) >= max(end, STL_HEADER) else 0
 
 
-def _loose(corners: Array, name: str) -> Triangles:
-    """Vertices and triangles of an STL file, which names the three corners of every triangle, shape (3 M, 3)."""
-    require_likely_count(len(corners) // 3, name)
-    return corners, np.arange(len(corners)).reshape(-1, 3)
+def _loose(corners: NDArray[np.floating], name: str) -> Triangles:
+    """Vertices and triangles of an STL file, which names the three corners of every triangle, shape (M, 3, 3)."""
+    require_likely_count(len(corners), name)
+    return corners.reshape(-1, 3).astype(np.float64), np.arange(3 * len(corners)).reshape(-1, 3)
 
 
 def _vertices_of_text_stl(data: bytes, name: str) -> bytes:

@@ -70,7 +70,7 @@ class TransferCertifier:
         return min([self._as_known(sequencer, best), *([below] if below else [])], key=lambda it: it.steps)
 
     def best(self, sequencer: Sequencer, trials: Sequence[SequencedBlocks]) -> SequencedBlocks:
-        """The best of some orders, those that straight transfers make short first, with certified ones; shortened."""
+        """The best of some orders with certified transfers, the shortest with straight ones tried first; shortened."""
         best = self.settle(sequencer, trials[0].schedule)
         for trial in trials[1:]:
             best = self.settle(sequencer, trial.schedule, below=best)
