@@ -83,8 +83,10 @@ def test_tasks_without_an_available_robot_are_refused_in_one_line(tmp_path: Path
     assert len(str(refused.value).splitlines()) == 1
 
 
-def test_a_circle_of_tasks_after_one_another_is_refused_when_the_file_is_read(tmp_path: Path) -> None:
-    text = OPEN.read_text()
+@pytest.mark.parametrize("program", ["{}", "{together: [top_3, edge_3]}"])
+def test_a_circle_of_tasks_after_one_another_is_refused_when_the_file_is_read(tmp_path: Path, program: str) -> None:
+    """What begins together beside the circle is no part of it."""
+    text = OPEN.read_text().replace("program: {}", f"program: {program}")
     for task, before in (("top_1", "top_2"), ("top_2", "edge_1"), ("edge_1", "top_1")):
         text = text.replace(f"  {task}:\n", f"  {task}:\n    after: [{before}]\n", 1)
     (tmp_path / "cell.yaml").write_text(text)
