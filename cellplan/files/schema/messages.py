@@ -166,8 +166,9 @@ def _words(expected: str) -> list[str]:
 
 
 def fields_of(annotation: Any) -> Mapping[str, Any]:
-    """Fields of an entry; none of anything else."""
-    return annotation.model_fields if isinstance(annotation, type) and issubclass(annotation, BaseModel) else {}
+    """Fields of an entry by key; none of anything else."""
+    is_entry = isinstance(annotation, type) and issubclass(annotation, BaseModel)
+    return {field.alias or name: field for name, field in annotation.model_fields.items()} if is_entry else {}
 
 
 def _bare(annotation: Any) -> Any:

@@ -89,7 +89,7 @@ CsvChoice = Annotated[
 ]
 
 
-class PathEntry(OneOf):
+class PathShapeEntry(OneOf):
     """Exactly one path, and its projection onto the part."""
 
     alternatives: ClassVar[tuple[str, ...]] = ("circle", "rectangle", "rhombus", "polyline", "csv")

@@ -4,8 +4,8 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, Tag, WithJsonSchema, model_validator
 
-from cellplan.files.schema.path import PathEntry
 from cellplan.files.schema.robot import Configuration
+from cellplan.files.schema.seam import PathEntry
 from cellplan.model.settings.checks import ToolDepth
 from cellplan.model.settings.entry import (
     DIRECTION_WORDS,
@@ -264,6 +264,8 @@ class TaskEntry(Entry):
                 raise rule("unexpected key, process decides how fast the tool moves along its path", key)
         if self.relative_to == "world" and self.path.project is not None:
             raise rule("unexpected key, a path in the world is not projected onto the part", "path.project")
+        if self.path.is_seam and self.tool_axis is not None:
+            raise rule("unexpected key, the walls and angles of the path say how the tool is held", "tool_axis")
         if self.start_deg is not None and self.start is not None:
             raise rule("expected either start_deg or start, got both", "start")
         if self.holder_deg is not None and self.holder is not None:

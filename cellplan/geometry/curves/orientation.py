@@ -6,7 +6,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.geometry.curves.curve import BezierCurve, Interval, spans_at, tangents
+from cellplan.geometry.curves.curve import Curve, Interval, spans_at, tangents
 from cellplan.geometry.curves.surface_patch import Patch
 from cellplan.geometry.transforms import Array, cross, frame_from_axes, rotation_about, rotation_exp, rotation_vector
 
@@ -89,7 +89,7 @@ class NormalFrame:
 class AxisFrame:
     """Tool z along an interpolated axis, normalised; tool x leaning to ``x_hint``, shape (3,)."""
 
-    axes: BezierCurve
+    axes: Curve
     x_hint: Array
 
     @property

@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.geometry.transforms import Array
 from cellplan.model.task.task import (
     CirclePath,
@@ -68,6 +69,8 @@ def _listed(task: Task) -> tuple[Array, Array | None]:
         case PolygonPath():
             first, second, normal = plane_axes(path.plane)
             return np.asarray(path.corners) @ np.stack([first, second]), outside_of(task, normal)
+        case SeamLine():
+            return path.points, None if task.tool_axis is None else -task.tool_axis
         case SampledPath() | TimedPath():
             return path.points, _outside_of_file(task, path)
         case SpacePolylinePath():

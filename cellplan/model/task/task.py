@@ -6,9 +6,11 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.geometry.transforms import Array
 from cellplan.model.origin import Origin
 from cellplan.model.settings.task import ProcessEntry, ToleranceEntry, TorchEntry, WeldPositionEntry
+from cellplan.model.task.seam import Seam
 
 TIME_TOLERANCE: Final = 1e-9  # [s] times nearer than this are the same: rounding of sums of durations
 
@@ -111,7 +113,7 @@ class TimedPath:
         return True
 
 
-PathSpec = CirclePath | PolygonPath | SpacePolylinePath | SampledPath | TimedPath
+PathSpec = CirclePath | PolygonPath | SpacePolylinePath | SampledPath | TimedPath | SeamLine
 
 
 class Frame(StrEnum):
@@ -171,6 +173,7 @@ class Task:
         name: Name of the task.
         robot: Name of the operator.
         path: The path as written.
+        seam: Walls beside the path, and how the tool is held to them; None where ``tool_axis`` or a file says so.
         project: Unit direction in P naming the side of the part onto which the path is projected (the outward normal
             there), shape (3,); None when the path is used at its place.
         plane_offset: Position of an unprojected planar path along the plane's normal axis in [m].
@@ -220,6 +223,7 @@ class Task:
     name: str
     robot: str
     path: PathSpec
+    seam: Seam | None = None
     project: Array | None = None
     plane_offset: float = 0.0
     tool_axis: Array | None = None

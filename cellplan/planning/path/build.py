@@ -24,6 +24,7 @@ from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.path.curve import PathCurve, path_curve
 from cellplan.planning.path.formatting import MM, direction_name, in_mm, length
 from cellplan.planning.path.projection import along, project_path
+from cellplan.planning.path.seam import follow_seam
 
 STANDSTILL: Final = 1e-4  # [-] of the largest speed by the parameter: a curve slower than this has a cusp there
 SAME_POSE: Final = 1e-9  # [m], [-] entries of poses that differ by less are those of one pose
@@ -50,9 +51,13 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
     outline = path_curve(task)
     refuse_path_in_metres(outline.curve, task=task, part=part)
     curve = project_path(outline, task, part)
+    if task.seam is None:
+        orientation = orient_tool(task, curve)
+    else:
+        curve, axes = follow_seam(task, curve, task.seam.angles)
+        orientation = _by_axes(axes, task, curve)
     arc = measure(curve.curve)
     refuse_unlikely_path(curve.curve, arc, task=task, part=part)
-    orientation = orient_tool(task, curve)
     if task.spin:
         orientation = SpunFrame(frame=orientation, angle=task.spin)
     is_timed = isinstance(task.path, TimedPath)
@@ -182,8 +187,7 @@ def orient_tool(task: Task, curve: PathCurve) -> Orientation:
         _refuse_parallel(-curve.patch.normals(p), p, task)
         return NormalFrame(patch=curve.patch, x_hint=task.tool_x)
     if curve.inward is not None:
-        _refuse_parallel(_unit(curve.inward.evaluate(u, (u[0], u[-1]))[0]), p, task)
-        return AxisFrame(axes=curve.inward, x_hint=task.tool_x)
+        return _by_axes(curve.inward, task, curve)
     raise InputError(
         f"{where}: 'normal' needs a surface: expected a path with project, a file with axes or rotations, or a "
         "direction such as -z"
@@ -212,10 +216,15 @@ def _from_file(path: SampledPath | TimedPath, task: Task, drawing: PathCurve) ->
         curve = spline_through(path.times, axes, is_closed=path.is_closed)
     else:
         curve = smooth_through(drawing.given, axes, breaks=breaks)
-    u = along(curve)
+    return _by_axes(curve, task, drawing)
+
+
+def _by_axes(axes: Curve, task: Task, drawing: PathCurve) -> AxisFrame:
+    """Tool frames by a moving axis, of any length, along a path."""
+    u = along(axes)
     p, _ = drawing.curve.evaluate(u, (u[0], u[-1]))
-    _refuse_parallel(_unit(curve.evaluate(u, (u[0], u[-1]))[0]), p, task)
-    return AxisFrame(axes=curve, x_hint=task.tool_x)
+    _refuse_parallel(_unit(axes.evaluate(u, (u[0], u[-1]))[0]), p, task)
+    return AxisFrame(axes=axes, x_hint=task.tool_x)
 
 
 def _returning(values: Array, drawing: PathCurve) -> Array:

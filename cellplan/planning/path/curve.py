@@ -1,6 +1,7 @@
 """The curve of a task's path in the part frame, with its stops, before projection; which points it may pass."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -12,10 +13,13 @@ from cellplan.geometry.curves.curve import (
     CircleCurve,
     Curve,
     chord_lengths,
+    cubic_controls,
     rounded_sides,
     smooth_through,
     straight_sides,
+    tangents,
 )
+from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.geometry.curves.spline import spline_through
 from cellplan.geometry.curves.surface_patch import Patch
 from cellplan.model.task.path_direction import outside_of, plane_axes
@@ -39,6 +43,7 @@ MOST_JOINED_MM: Final = 1.0  # [mm] farther points are joined by hand
 LOOKED_AT: Final = 33  # places of each side at which a curve is held against it
 SAME_POINT: Final = 1e-9  # [m] points nearer than this are one point written twice
 STRAIGHT_ON: Final = 1e-9  # [rad] a change of direction below this is no corner
+SMOOTH_START: Final = 1e-6  # [rad] a change of direction below this is none where a seam line comes back to its start
 SHARPEST_BLEND: Final = np.deg2rad(175.0)  # a path that turns back more sharply cannot be rounded without a cusp
 IN_PLANE: Final = np.sin(np.deg2rad(1.0))  # [-] a side seen at a flatter angle than 1 deg squeezes the path to a line
 
@@ -54,6 +59,9 @@ class PathCurve:
     runs_on: bool = False  # whether a closed curve passes its start without a corner
     patch: Patch | None = None  # the smooth patch of the part under it; None on a mesh or where it is not projected
     inward: BezierCurve | None = None  # inward normals of a mesh along the curve; None elsewhere
+    walls: Mapping[str, Curve] = field(
+        default_factory=dict
+    )  # outward normals of walls that a seam line states, by name
     bulge: float | None = None  # greatest distance in [m] of a smooth curve from its chords, unprojected; else None
 
 
@@ -79,6 +87,8 @@ def path_curve(task: Task) -> PathCurve:
         case TimedPath():
             refuse_near_times(path, where)
             return _timed(path)
+        case SeamLine():
+            return _seam_line(path, task)
 
 
 def _circle(path: CirclePath, task: Task, where: str) -> PathCurve:
@@ -169,6 +179,41 @@ def _timed(path: TimedPath) -> PathCurve:
     """Smooth curve over time."""
     curve = spline_through(path.times, path.points, is_closed=path.is_closed)
     return _run_on(curve, path.times, is_closed=path.is_closed)
+
+
+def _seam_line(path: SeamLine, task: Task) -> PathCurve:
+    """Cubics by the points and directions of a seam line, with stops at its corners, and the normals of its walls."""
+    is_side = np.diff(path.behind) > 0.0
+    knots = np.append(path.behind[:-1][is_side], path.behind[-1])
+    width = np.diff(knots)[:, None]
+
+    def spans(values: Array, rates: Array | None = None) -> BezierCurve:
+        """Cubics through values, by their rates if they are known."""
+        start, end = values[:-1][is_side], values[1:][is_side]
+        at_ends = tangents((end - start) / width, width, breaks)
+        if rates is not None:
+            at_ends = rates[:-1][is_side], rates[1:][is_side]
+        return BezierCurve(knots=knots, control=cubic_controls(width, (start, end), at_ends))
+
+    corners = path.behind[:-1][~is_side]
+    if len(corners) and task.blend is not None:
+        raise InputError(
+            f"{task.where('corners', shared='motion.corners')}: expected stop for a chain of edges with corners, got a "
+            "rounding: its corners are where its edges meet"
+        )
+    is_smooth = path.is_closed and bool(np.linalg.norm(path.tangents[0] - path.tangents[-1]) <= SMOOTH_START)
+    breaks = np.isin(knots, corners)
+    breaks[[0, -1]] = not is_smooth
+    walls = {name: spans(normals) for name, normals in path.walls.items()}
+    stops = np.unique(np.concatenate([knots[[0, -1]], corners]))
+    return PathCurve(
+        curve=spans(path.points, path.tangents),
+        stops=stops,
+        given=knots,
+        is_closed=path.is_closed,
+        runs_on=is_smooth and not len(corners),
+        walls=walls,
+    )
 
 
 def _run_on(curve: BezierCurve, given: Array, *, is_closed: bool) -> PathCurve:

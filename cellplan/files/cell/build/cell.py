@@ -15,18 +15,21 @@ from cellplan.files.robots.rules import Given, home_configuration, start_posture
 from cellplan.files.schema import CellDocument
 from cellplan.files.schema.cell import CycleEntry, MotionEntry
 from cellplan.files.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
-from cellplan.files.schema.path import PathEntry, PolylineEntry
+from cellplan.files.schema.path import PathShapeEntry, PolylineEntry
 from cellplan.files.schema.robot import JointSumEntry, RobotEntry, ServiceEntry
+from cellplan.files.schema.seam import SURFACE, PathEntry
 from cellplan.files.schema.shapes import ObstacleEntry
 from cellplan.files.schema.task import BlendEntry, CornerChoice, TaskEntry, TrapezoidEntry, ViaEntry
 from cellplan.files.schema.tool import OF_ROD, RodEntry, ToolEntry
 from cellplan.files.shapes import MeshReader, centred_solid, direction, obstacle_shape, tool_solid
+from cellplan.geometry.curves.seam_line import SeamAngles
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Grasp, Mode, MotionSettings, Obstacle, Part, Robot, Timing, Tool
 from cellplan.model.cell.rod import Holder, Rod, tool_body_name
 from cellplan.model.origin import Origin
 from cellplan.model.robot.robot import BASE, Body, JointSum, RobotModel, configuration_in_si
-from cellplan.model.settings.units import Mm, in_si, si_or_none
+from cellplan.model.settings.units import Deg, Mm, in_si, si_or_none
+from cellplan.model.task.seam import Seam, WallPlace
 from cellplan.model.task.task import (
     CirclePath,
     Frame,
@@ -146,6 +149,7 @@ def build_task(
         name=name,
         robot=entry.robot,
         path=_path(name, entry.path, read_targets),
+        seam=_seam(entry.path),
         project=None if entry.path.project is None else direction(entry.path.project),
         plane_offset=(entry.path.offset_mm or Mm(0.0)).si,
         tool_axis=None if tool_axis is None else direction(tool_axis),
@@ -179,6 +183,25 @@ def build_task(
         holder_moves=bool(entry.holder_moves),
         **_via_points(entry.via or ViaEntry(), models[entry.robot], document.robots[entry.robot]),
         origin=origin,
+    )
+
+
+def _seam(entry: PathEntry) -> Seam | None:
+    """How the tool is held to walls; None for a path without."""
+    if not entry.is_seam:
+        return None
+    walls = {
+        name: WallPlace(wall) if wall in tuple(WallPlace) else direction(wall)
+        for name, wall in (entry.walls or dict.fromkeys(entry.wall_names, SURFACE)).items()
+    }
+    return Seam(
+        walls=walls,
+        angles=SeamAngles(
+            face=entry.from_ or entry.wall_names[0],
+            work=(entry.work_deg or Deg(0.0)).si,
+            travel=(entry.push_deg or Deg(0.0)).si - (entry.drag_deg or Deg(0.0)).si,
+            standoff=entry.standoff_mm.si,
+        ),
     )
 
 
@@ -223,7 +246,7 @@ def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
     if entry.tool_axis not in {None, "normal"}:
         return entry.tool_axis, entry.tool_x
     path = entry.path
-    if needs_surface(entry) or path.project is not None or path.csv is not None:
+    if path.is_seam or needs_surface(entry) or path.project is not None or path.csv is not None:
         return None, entry.tool_x
     shape = path.circle or path.rectangle or path.rhombus or path.polyline
     normal = PLANE_NORMAL[(shape.plane if shape else None) or "xy"]
@@ -246,7 +269,8 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         entry["tolerance"].setdefault("between_rows_deg", task.tolerance.orientation_deg)
         if task.relative_to == "part":
             entry.setdefault("tool_depth_mm", document.checks.tool_depth_mm)
-        entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
+        if not task.path.is_seam:
+            entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
         if name not in timed:
             if task.process is None:
                 entry.setdefault("time_law", motion["time_law"])
@@ -272,7 +296,7 @@ def _written_program(document: CellDocument) -> dict[str, Any]:
     return {"program": {**values, "marks": tuple(mark.model_dump() for mark in document.program.all_marks)}}
 
 
-def _path(name: str, entry: PathEntry, read_targets: TargetReader) -> PathSpec:
+def _path(name: str, entry: PathShapeEntry, read_targets: TargetReader) -> PathSpec:
     """Geometry of a path in [m]."""
     if entry.circle is not None:
         return _circle(entry.circle)

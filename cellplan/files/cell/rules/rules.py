@@ -121,7 +121,7 @@ def _times(valid: ValidEntries, document: YamlDocument, name: str) -> Iterator[F
 def needs_surface(task: TaskEntry) -> bool:
     """Whether the tool's axis can come from nothing but the part's surface or the file of the path."""
     turns = ORIENTATION_AXES & set(task.axes)
-    return task.tool_axis == "normal" or (task.tool_axis is None and bool(turns))
+    return task.tool_axis == "normal" or (task.tool_axis is None and bool(turns) and not task.path.is_seam)
 
 
 def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Finding]:
@@ -161,6 +161,9 @@ def target_findings(valid: ValidEntries, targets: Targets, document: YamlDocumen
 def _axes(task: TaskEntry, path: SampledPath | TimedPath, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A file without orientations that is not projected onto the part has no normals."""
     has_axes = path.axes is not None or path.rotations is not None
+    if has_axes and task.path.is_seam:
+        text = f"expected no walls and angles beside {path.source}, which gives the tool's orientation already"
+        yield document.finding(("tasks", name, "path"), text)
     if needs_surface(task) and task.path.project is None and not has_axes:
         project = "" if task.relative_to == "world" else "add project: +z (or another side), "
         text = (

@@ -1,0 +1,96 @@
+"""Paths as welders describe them: walls beside a seam, and how the tool is held to them."""
+
+from typing import Annotated, ClassVar, Final, Literal, Self
+
+from pydantic import ConfigDict, Field, Tag, model_validator
+
+from cellplan.files.schema.path import PathShapeEntry
+from cellplan.model.settings.entry import DIRECTION_WORDS, Name, Vector, by_kind, rule, setting
+from cellplan.model.settings.units import Deg, Mm, Within
+
+WALL_WORDS: Final = f"surface, left, right, {DIRECTION_WORDS}"
+MOST_WALLS: Final = 2  # beside one seam
+STEEPEST_DEG: Final = 90.0  # of a work angle: beyond it the tool is in the wall
+FLATTEST_DEG: Final = 80.0  # of a travel angle: beyond it the tool slides along the seam
+FARTHEST_MM: Final = 500.0  # no tool works from farther away
+SURFACE: Final = "surface"
+SIDES: Final = ("left", "right")
+
+WallChoice = Annotated[
+    Annotated[Literal["surface", "left", "right", "+x", "-x", "+y", "-y", "+z", "-z"], Tag(f"<{WALL_WORDS}>")]
+    | Annotated[Vector, Tag("<list>")],
+    by_kind(WALL_WORDS, list=tuple),
+]
+TravelAngle = Annotated[Deg, Within(ge=0.0, le=FLATTEST_DEG)]
+
+
+class PathEntry(PathShapeEntry):
+    """Exactly one path, its projection onto the part, and how the tool is held to the walls beside it."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(serialize_by_alias=True)
+
+    walls: dict[Name, WallChoice] | None = setting(
+        None,
+        "One or two walls beside the path by name, each with its outward normal in the part frame: a direction, or "
+        "surface for that of the part under a projected path, or left or right for one that stands upright on the "
+        "other wall, on that side of travel. When absent a projected path has the one wall surface.",
+        min_length=1,
+        max_length=MOST_WALLS,
+    )
+    from_: Name | None = Field(
+        default=None,
+        alias="from",
+        description="Wall that the work angle is measured from; required where there are two.",
+    )
+    work_deg: Annotated[Deg, Within(ge=-STEEPEST_DEG, le=STEEPEST_DEG)] | None = setting(
+        None,
+        "Work angle: between the tool and the perpendicular to the wall under from, across the seam, towards the open "
+        "side, away from the other wall: 45 for a fillet, 0 for a butt joint. Beside one wall, or two that face alike, "
+        "it is positive to the left of travel, seen against the normal. 0 when absent and another angle is given.",
+    )
+    push_deg: TravelAngle | None = setting(
+        None,
+        "Travel angle of a tool that points along travel: between the tool and the perpendicular to the seam. Excludes "
+        "drag_deg; 0 when both are absent.",
+    )
+    drag_deg: TravelAngle | None = setting(None, "Travel angle of a tool that points against travel.")
+    standoff_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_MM)] = setting(
+        Mm(0.0), "Distance of the tool tip from the path, against the tool's own axis."
+    )
+
+    @model_validator(mode="after")
+    def _has_its_walls(self) -> Self:
+        """Angles have walls, walls have angles, and one of the walls is what the work angle is measured from."""
+        if self.push_deg is not None and self.drag_deg is not None:
+            raise rule("expected either push_deg or drag_deg, got both", "drag_deg")
+        if not self.is_seam:
+            return self
+        names = self.wall_names
+        if not names:
+            raise rule(
+                "missing, expected the walls beside the path, such as {floor: +z, web: -y}, or project: +z (or another "
+                "side)",
+                "walls",
+            )
+        if self.from_ is None and len(names) > 1:
+            raise rule(f"missing, expected the wall that work_deg is measured from: {' or '.join(names)}", "from")
+        if self.from_ is not None and self.from_ not in names:
+            raise rule(f"expected one of the walls {' and '.join(names)}, got '{self.from_}'", "from")
+        walls = self.walls or {}
+        for name, wall in walls.items():
+            if wall == SURFACE and self.project is None:
+                raise rule("expected a direction on a path without project, got surface", f"walls.{name}")
+            if wall in SIDES and all(other in SIDES for other in walls.values()):
+                raise rule(f"expected a wall beside it that is no side of travel, got {wall}", f"walls.{name}")
+        return self
+
+    @property
+    def is_seam(self) -> bool:
+        """Whether the tool is held to walls."""
+        keys = (self.walls, self.from_, self.work_deg, self.push_deg, self.drag_deg)
+        return any(key is not None for key in keys) or self.standoff_mm > 0.0
+
+    @property
+    def wall_names(self) -> tuple[str, ...]:
+        """Names of the walls beside it."""
+        return tuple(self.walls or ()) or ((SURFACE,) if self.project is not None else ())

@@ -1,0 +1,117 @@
+"""Keys of seams: what they make of a task, that they are written as they were read, and every refusal word for word."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cellplan.files.cell.load import load_cell
+from cellplan.files.cell.write import render_cell
+from cellplan.model.cell.cell import Cell
+from cellplan.model.task.seam import WallPlace
+
+Load = Callable[..., Cell]
+Refuse = Callable[..., list[str]]
+PROJECTED = "    path: {circle: {radius_mm: 100, plane: xy}, project: +z}\n    tool_axis: normal\n"
+LINE = "polyline: {points_mm: [[-100, 0, 250], [100, 0, 250]]}"
+
+
+def path(words: str, shape: str = LINE, rest: str = "") -> tuple[str, str]:
+    return PROJECTED, f"    path: {{{shape}, {words}}}\n{rest}"
+
+
+def test_keys_become_walls_and_angles(load: Load) -> None:
+    words = "walls: {floor: +z, web: [0, -2, 0]}, from: web, work_deg: 30, drag_deg: 10, standoff_mm: 12"
+    seam = load(path(words)).tasks[0].seam
+    assert seam is not None
+
+    assert list(seam.walls) == ["floor", "web"]
+    assert np.array_equal(np.array(list(seam.walls.values())), [[0, 0, 1], [0, -1, 0]])
+    assert seam.angles.face == "web"
+    assert [seam.angles.work, seam.angles.travel, seam.angles.standoff] == pytest.approx(
+        [np.pi / 6.0, -np.pi / 18.0, 0.012], rel=1e-15
+    )
+
+
+def test_projected_path_has_the_surface_as_its_wall(load: Load) -> None:
+    seam = load(path("project: +z, push_deg: 15", "circle: {radius_mm: 100, plane: xy}")).tasks[0].seam
+    assert seam is not None
+
+    assert dict(seam.walls) == {"surface": WallPlace.SURFACE}
+    assert (seam.angles.face, seam.angles.work) == ("surface", 0.0)
+
+
+def test_seam_is_written_as_it_was_read(load: Load, tmp_path: Path) -> None:
+    words = "walls: {floor: +z, web: left}, from: floor, work_deg: 40, push_deg: 10, standoff_mm: 12"
+    cell = load(path(words))
+    (tmp_path / "again").write_text(render_cell(cell), encoding="utf-8")
+    again = load_cell("again")
+
+    assert render_cell(again) == render_cell(cell)
+    assert "from: floor" in render_cell(cell)
+    assert again.tasks[0].seam is not None
+    assert again.tasks[0].seam.angles == cell.tasks[0].seam.angles  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            "work_deg: 45",
+            "c:19: tasks.ring.path.walls: missing, expected the walls beside the path, such as {floor: +z, web: -y}, "
+            "or project: +z (or another side)",
+        ),
+        (
+            "walls: {floor: +z, web: -y}, work_deg: 45",
+            "c:19: tasks.ring.path.from: missing, expected the wall that work_deg is measured from: floor or web",
+        ),
+        (
+            "walls: {floor: +z}, from: web",
+            "c:19: tasks.ring.path.from: expected one of the walls floor, got 'web'",
+        ),
+        (
+            "walls: {floor: +z}, push_deg: 5, drag_deg: 5",
+            "c:19: tasks.ring.path.drag_deg: expected either push_deg or drag_deg, got both",
+        ),
+        (
+            "walls: {floor: surface}",
+            "c:19: tasks.ring.path.walls.floor: expected a direction on a path without project, got surface",
+        ),
+        (
+            "walls: {web: left}",
+            "c:19: tasks.ring.path.walls.web: expected a wall beside it that is no side of travel, got left",
+        ),
+        (
+            "walls: {floor: up}",
+            "c:19: tasks.ring.path.walls.floor: expected surface, left, right, +x, -x, +y, -y, +z, -z or a direction "
+            "[x, y, z], got 'up'",
+        ),
+        (
+            "walls: {floor: +z}, work_deg: 120",
+            "c:19: tasks.ring.path.work_deg: expected a number of degrees of at most 90, got 120",
+        ),
+    ],
+)
+def test_words_that_make_no_seam_are_refused(refuse: Refuse, words: str, message: str) -> None:
+    assert refuse(path(words)) == [message]
+
+
+def test_misspelt_key_is_refused_with_the_one_that_is_meant(refuse: Refuse) -> None:
+    (message,) = refuse(path("walls: {floor: +z}, form: floor"))
+
+    assert message.startswith("c:19: tasks.ring.path.form: unknown key, did you mean 'from'?; allowed: circle, ")
+
+
+def test_tool_axis_is_refused_beside_a_seam(refuse: Refuse) -> None:
+    assert refuse(path("walls: {floor: +z}", rest="    tool_axis: -z\n")) == [
+        "c:20: tasks.ring.tool_axis: unexpected key, the walls and angles of the path say how the tool is held"
+    ]
+
+
+def test_file_with_axes_is_refused_beside_a_seam(refuse: Refuse, tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text("x_mm,y_mm,z_mm,i,j,k\n-100,0,250,0,0,-1\n100,0,250,0,0,-1\n", encoding="utf-8")
+
+    assert refuse(path("walls: {floor: +z}", "csv: p.csv")) == [
+        "c:19: tasks.ring.path: expected no walls and angles beside p.csv, which gives the tool's orientation already"
+    ]
