@@ -54,8 +54,8 @@ class PathEntry(PathShapeEntry):
         "drag_deg; 0 when both are absent.",
     )
     drag_deg: TravelAngle | None = setting(None, "Travel angle of a tool that points against travel.")
-    standoff_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_MM)] = setting(
-        Mm(0.0), "Distance of the tool tip from the path, against the tool's own axis."
+    standoff_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_MM)] | None = setting(
+        None, "Distance of the tool tip from the path, against the tool's own axis; 0 when absent."
     )
 
     @model_validator(mode="after")
@@ -87,8 +87,8 @@ class PathEntry(PathShapeEntry):
     @property
     def is_seam(self) -> bool:
         """Whether the tool is held to walls."""
-        keys = (self.walls, self.from_, self.work_deg, self.push_deg, self.drag_deg)
-        return any(key is not None for key in keys) or self.standoff_mm > 0.0
+        keys = (self.walls, self.from_, self.work_deg, self.push_deg, self.drag_deg, self.standoff_mm)
+        return any(key is not None for key in keys)
 
     @property
     def wall_names(self) -> tuple[str, ...]:

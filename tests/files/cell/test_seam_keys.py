@@ -44,7 +44,7 @@ def test_projected_path_has_the_surface_as_its_wall(load: Load) -> None:
 
 def test_seam_is_written_as_it_was_read(load: Load, tmp_path: Path) -> None:
     words = "walls: {floor: +z, web: left}, from: floor, work_deg: 40, push_deg: 10, standoff_mm: 12"
-    cell = load(path(words))
+    cell = load(path(words, "polyline: {points_mm: [[-100, 0], [100, 0]], plane: xy}"))
     (tmp_path / "again").write_text(render_cell(cell), encoding="utf-8")
     again = load_cell("again")
 

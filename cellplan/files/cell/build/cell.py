@@ -1,6 +1,6 @@
 """Conversion of the entries of a cell file, in millimetres and degrees, to the model in metres and radians."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -9,41 +9,31 @@ import numpy as np
 from cellplan.files.cell.build.accelerations import acceleration_rule, controller_cycle
 from cellplan.files.cell.build.grips import grip_bodies, gripper_bodies
 from cellplan.files.cell.build.mounting import build_attachments, build_mount, rail_bodies, with_floor_height
+from cellplan.files.cell.build.path import TargetReader, path_fields
 from cellplan.files.cell.rules.path_rules import build_path
 from cellplan.files.cell.rules.rules import needs_surface
 from cellplan.files.robots.rules import Given, home_configuration, start_posture
 from cellplan.files.schema import CellDocument
 from cellplan.files.schema.cell import CycleEntry, MotionEntry
-from cellplan.files.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
-from cellplan.files.schema.path import PathShapeEntry, PolylineEntry
+from cellplan.files.schema.messages import fields_of
 from cellplan.files.schema.robot import JointSumEntry, RobotEntry, ServiceEntry
-from cellplan.files.schema.seam import SURFACE, PathEntry
+from cellplan.files.schema.seam import PathEntry
 from cellplan.files.schema.shapes import ObstacleEntry
 from cellplan.files.schema.task import BlendEntry, CornerChoice, TaskEntry, TrapezoidEntry, ViaEntry
 from cellplan.files.schema.tool import OF_ROD, RodEntry, ToolEntry
 from cellplan.files.shapes import MeshReader, centred_solid, direction, obstacle_shape, tool_solid
-from cellplan.geometry.curves.seam_line import SeamAngles
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Grasp, Mode, MotionSettings, Obstacle, Part, Robot, Timing, Tool
 from cellplan.model.cell.rod import Holder, Rod, tool_body_name
 from cellplan.model.origin import Origin
 from cellplan.model.robot.robot import BASE, Body, JointSum, RobotModel, configuration_in_si
-from cellplan.model.settings.units import Deg, Mm, in_si, si_or_none
-from cellplan.model.task.seam import Seam, WallPlace
+from cellplan.model.settings.units import Mm, in_si, si_or_none
 from cellplan.model.task.task import (
-    CirclePath,
     Frame,
     OffPart,
-    PathSpec,
-    PlaneName,
-    PolygonPath,
-    RunDirection,
-    SampledPath,
     Service,
-    SpacePolylinePath,
     StraightMove,
     Task,
-    TimedPath,
     TimeLaw,
     TimeLawKind,
     ViaPoint,
@@ -51,7 +41,6 @@ from cellplan.model.task.task import (
 
 COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
 PLANE_NORMAL: Final = {"xy": "z", "yz": "x", "xz": "y"}
-TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> its file, read
 
 
 def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh: MeshReader) -> Robot:
@@ -148,10 +137,7 @@ def build_task(
     return Task(
         name=name,
         robot=entry.robot,
-        path=_path(name, entry.path, read_targets),
-        seam=_seam(entry.path),
-        project=None if entry.path.project is None else direction(entry.path.project),
-        plane_offset=(entry.path.offset_mm or Mm(0.0)).si,
+        **path_fields(name, entry.path, read_targets),
         tool_axis=None if tool_axis is None else direction(tool_axis),
         tool_x=direction(tool_x),
         spin=entry.spin_deg.si,
@@ -183,25 +169,6 @@ def build_task(
         holder_moves=bool(entry.holder_moves),
         **_via_points(entry.via or ViaEntry(), models[entry.robot], document.robots[entry.robot]),
         origin=origin,
-    )
-
-
-def _seam(entry: PathEntry) -> Seam | None:
-    """How the tool is held to walls; None for a path without."""
-    if not entry.is_seam:
-        return None
-    walls = {
-        name: WallPlace(wall) if wall in tuple(WallPlace) else direction(wall)
-        for name, wall in (entry.walls or dict.fromkeys(entry.wall_names, SURFACE)).items()
-    }
-    return Seam(
-        walls=walls,
-        angles=SeamAngles(
-            face=entry.from_ or entry.wall_names[0],
-            work=(entry.work_deg or Deg(0.0)).si,
-            travel=(entry.push_deg or Deg(0.0)).si - (entry.drag_deg or Deg(0.0)).si,
-            standoff=entry.standoff_mm.si,
-        ),
     )
 
 
@@ -276,7 +243,8 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
                 entry.setdefault("time_law", motion["time_law"])
             entry.setdefault("corners", motion["corners"])
         if task.path.is_planar and task.path.project is None:
-            entry["path"].setdefault("offset_mm", 0.0)
+            path = {"offset_mm": 0.0, **entry["path"]}
+            entry["path"] = {key: path[key] for key in fields_of(PathEntry) if key in path}
         values["tasks"][name] = {key: entry[key] for key in TaskEntry.model_fields if key in entry}
     for name, robot in document.robots.items():
         written = with_floor_height(values["robots"][name], robot, document.environment)
@@ -294,57 +262,6 @@ def _written_program(document: CellDocument) -> dict[str, Any]:
         return {}
     values = document.program.model_dump(exclude_none=True)
     return {"program": {**values, "marks": tuple(mark.model_dump() for mark in document.program.all_marks)}}
-
-
-def _path(name: str, entry: PathShapeEntry, read_targets: TargetReader) -> PathSpec:
-    """Geometry of a path in [m]."""
-    if entry.circle is not None:
-        return _circle(entry.circle)
-    if entry.rectangle is not None:
-        return _polygon(entry.rectangle, entry.rectangle.sides_mm, ((1, 1), (-1, 1), (-1, -1), (1, -1)))
-    if entry.rhombus is not None:
-        return _polygon(entry.rhombus, entry.rhombus.diagonals_mm, ((1, 0), (0, 1), (-1, 0), (0, -1)))
-    return read_targets(name) if entry.polyline is None else _polyline(entry.polyline)
-
-
-def _circle(entry: CircleEntry) -> CirclePath:
-    """A circle with a unit direction to its start."""
-    u, v = entry.center_mm
-    toward = start_direction(entry.start_at, entry.plane)
-    size = float(np.hypot(*toward))
-    return CirclePath(
-        plane=PlaneName(entry.plane),
-        center=(u.si, v.si),
-        radius=entry.radius_mm.si,
-        start=(toward[0] / size, toward[1] / size),
-        direction=RunDirection(entry.direction),
-    )
-
-
-def _polygon(
-    entry: RectangleEntry | RhombusEntry, extents_mm: tuple[float, float], signs: tuple[tuple[int, int], ...]
-) -> PolygonPath:
-    """Corners of a centred shape, turned and moved in its plane, from its start on."""
-    start = tuple(int(np.sign(part)) for part in start_direction(entry.start_at, entry.plane))
-    first = signs.index((start[0], start[1]))
-    signs = (*signs[first:], *signs[:first])
-    angle = entry.angle_deg.si
-    R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    corners = np.array(signs) * (0.5 * np.array(extents_mm)) @ R.T + np.array(entry.center_mm)
-    return PolygonPath(
-        plane=PlaneName(entry.plane),
-        corners=tuple((Mm(u).si, Mm(v).si) for u, v in corners),
-        is_closed=True,
-        direction=RunDirection(entry.direction),
-    )
-
-
-def _polyline(entry: PolylineEntry) -> PathSpec:
-    """Points in a plane or in space."""
-    points = [tuple(value.si for value in point) for point in entry.points_mm]
-    if entry.plane is None:
-        return SpacePolylinePath(points=tuple((x, y, z) for x, y, z in points), is_closed=entry.closed)
-    return PolygonPath(plane=PlaneName(entry.plane), corners=tuple((u, v) for u, v in points), is_closed=entry.closed)
 
 
 def _time_law(law: str | TrapezoidEntry) -> TimeLaw:

@@ -1,0 +1,116 @@
+"""Paths of a cell file, in millimetres and degrees, become those of the model, in metres and radians."""
+
+from collections.abc import Callable
+from typing import TypedDict
+
+import numpy as np
+
+from cellplan.files.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
+from cellplan.files.schema.path import PathShapeEntry, PolylineEntry
+from cellplan.files.schema.seam import SURFACE, PathEntry
+from cellplan.files.shapes import direction
+from cellplan.geometry.arrays import Array
+from cellplan.geometry.curves.seam_line import SeamAngles
+from cellplan.model.settings.units import Deg, Mm
+from cellplan.model.task.seam import Seam, WallPlace
+from cellplan.model.task.task import (
+    CirclePath,
+    PathSpec,
+    PlaneName,
+    PolygonPath,
+    RunDirection,
+    SampledPath,
+    SpacePolylinePath,
+    TimedPath,
+)
+
+TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> its file, read
+
+
+class PathFields(TypedDict):
+    """What a task has of its path."""
+
+    path: PathSpec
+    seam: Seam | None
+    project: Array | None
+    plane_offset: float
+
+
+def path_fields(name: str, entry: PathEntry, read_targets: TargetReader) -> PathFields:
+    """Geometry of a path, how the tool is held to walls, and its projection or place."""
+    return PathFields(
+        path=_path(name, entry, read_targets),
+        seam=_seam(entry),
+        project=None if entry.project is None else direction(entry.project),
+        plane_offset=(entry.offset_mm or Mm(0.0)).si,
+    )
+
+
+def _path(name: str, entry: PathShapeEntry, read_targets: TargetReader) -> PathSpec:
+    """Geometry of a path in [m]."""
+    if entry.circle is not None:
+        return _circle(entry.circle)
+    if entry.rectangle is not None:
+        return _polygon(entry.rectangle, entry.rectangle.sides_mm, ((1, 1), (-1, 1), (-1, -1), (1, -1)))
+    if entry.rhombus is not None:
+        return _polygon(entry.rhombus, entry.rhombus.diagonals_mm, ((1, 0), (0, 1), (-1, 0), (0, -1)))
+    return read_targets(name) if entry.polyline is None else _polyline(entry.polyline)
+
+
+def _circle(entry: CircleEntry) -> CirclePath:
+    """A circle with a unit direction to its start."""
+    u, v = entry.center_mm
+    toward = start_direction(entry.start_at, entry.plane)
+    size = float(np.hypot(*toward))
+    return CirclePath(
+        plane=PlaneName(entry.plane),
+        center=(u.si, v.si),
+        radius=entry.radius_mm.si,
+        start=(toward[0] / size, toward[1] / size),
+        direction=RunDirection(entry.direction),
+    )
+
+
+def _polygon(
+    entry: RectangleEntry | RhombusEntry, extents_mm: tuple[float, float], signs: tuple[tuple[int, int], ...]
+) -> PolygonPath:
+    """Corners of a centred shape, turned and moved in its plane, from its start on."""
+    start = tuple(int(np.sign(part)) for part in start_direction(entry.start_at, entry.plane))
+    first = signs.index((start[0], start[1]))
+    signs = (*signs[first:], *signs[:first])
+    angle = entry.angle_deg.si
+    R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    corners = np.array(signs) * (0.5 * np.array(extents_mm)) @ R.T + np.array(entry.center_mm)
+    return PolygonPath(
+        plane=PlaneName(entry.plane),
+        corners=tuple((Mm(u).si, Mm(v).si) for u, v in corners),
+        is_closed=True,
+        direction=RunDirection(entry.direction),
+    )
+
+
+def _polyline(entry: PolylineEntry) -> PathSpec:
+    """Points in a plane or in space."""
+    points = [tuple(value.si for value in point) for point in entry.points_mm]
+    if entry.plane is None:
+        return SpacePolylinePath(points=tuple((x, y, z) for x, y, z in points), is_closed=entry.closed)
+    return PolygonPath(plane=PlaneName(entry.plane), corners=tuple((u, v) for u, v in points), is_closed=entry.closed)
+
+
+def _seam(entry: PathEntry) -> Seam | None:
+    """How the tool is held to walls; None for a path without."""
+    if not entry.is_seam:
+        return None
+    walls = {
+        name: WallPlace(wall) if wall in tuple(WallPlace) else direction(wall)
+        for name, wall in (entry.walls or dict.fromkeys(entry.wall_names, SURFACE)).items()
+    }
+    return Seam(
+        walls=walls,
+        angles=SeamAngles(
+            face=entry.from_ or entry.wall_names[0],
+            work=(entry.work_deg or Deg(0.0)).si,
+            travel=(entry.push_deg or Deg(0.0)).si - (entry.drag_deg or Deg(0.0)).si,
+            standoff=(entry.standoff_mm or Mm(0.0)).si,
+        ),
+    )
