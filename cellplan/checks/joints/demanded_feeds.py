@@ -13,7 +13,7 @@ from cellplan.model.cell.joint_limits import acceleration_limit, retimed_jerk_li
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import Check
 from cellplan.model.settings.task import ProcessEntry
-from cellplan.model.task.clocked_path import fixed_rests, process_span
+from cellplan.model.task.clocked_path import fixed_rests, on_line, process_span
 from cellplan.model.task.task import TIME_TOLERANCE, Task
 from cellplan.model.units import MM
 from cellplan.scene.scene import Scene
@@ -23,7 +23,7 @@ PERCENT: Final = 100.0
 
 
 def check_feeds(scene: Scene, schedule: Schedule, q: RobotRows, X_WP: Array) -> Iterator[Check]:
-    """The speed of every tool with a demanded feed against it.
+    """The speed of every tool with a demanded feed against it; of one that weaves, that along its seam.
 
     Between the ramps of its path the speed between two rows must be within the tolerance; in the ramps it must not be
     larger. The delays of a retimed program must not be longer by more than that share, and a step.
@@ -36,6 +36,9 @@ def check_feeds(scene: Scene, schedule: Schedule, q: RobotRows, X_WP: Array) -> 
         if task.process is not None:
             X_WT = scene.chains[task.robot].tool_poses(q[task.robot])
             points = relative_to_task_frame(task, X_WT, X_WP)[:, :3, 3]
+            path = schedule.woven(task)
+            if path is not None:
+                points = points - on_line(path, scheduled.travelled)[1]
             speeds = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(schedule.times)
             yield _check(scene.cell, scheduled, task.process, times=schedule.times, speeds=speeds, q=q)
     clock = schedule.clock

@@ -11,6 +11,7 @@ from cellplan.measures.weld_position import position_name, torch_angles, weld_an
 from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import Check
+from cellplan.model.task.clocked_path import on_line
 from cellplan.model.units import MM
 from cellplan.scene.kinematics.screw_chain import Chains
 
@@ -33,8 +34,8 @@ def check_weld_positions(schedule: Schedule, chains: Chains, q: RobotRows, X_WP:
             continue
         X_WT = chains[task.robot].tool_poses(q[task.robot][rows])
         R_WP = np.broadcast_to(X_WP, (len(schedule.times), 4, 4))[rows, :3, :3]
-        velocity = (R_WP @ scheduled.V_PT_P[rows, :3, None])[..., 0]
-        slope, rotation = weld_angles(X_WT, velocity / np.linalg.norm(velocity, axis=1, keepdims=True))
+        travel = (R_WP @ _travel(scheduled, schedule)[rows, :, None])[..., 0]
+        slope, rotation = weld_angles(X_WT, travel / np.linalg.norm(travel, axis=1, keepdims=True))
         times = schedule.times[rows]
         if task.torch is not None:
             yield _within("torch_angle", task.name, torch_angles(X_WT), (-np.inf, task.torch.within_deg.si), times)
@@ -42,6 +43,12 @@ def check_weld_positions(schedule: Schedule, chains: Chains, q: RobotRows, X_WP:
             yield _within("weld_slope", task.name, slope, task.weld_position.slope, times)
             names = sorted({position_name(*angles) for angles in zip(slope.tolist(), rotation.tolist(), strict=True)})
             yield _within("weld_rotation", task.name, rotation, task.weld_position.rotation, times, ", ".join(names))
+
+
+def _travel(scheduled: TaskSchedule, schedule: Schedule) -> Array:
+    """Directions of travel along a path at each row, of any length, shape (N, 3), expressed in P."""
+    path = schedule.woven(scheduled.task)
+    return scheduled.V_PT_P[:, :3] if path is None else np.gradient(on_line(path, scheduled.travelled)[0], axis=0)
 
 
 def _travelled_rows(scheduled: TaskSchedule, times: Array) -> Indices:

@@ -24,6 +24,7 @@ from cellplan.files.cell.build.mounting import (
     on_mount,
     rail_entries,
 )
+from cellplan.files.cell.build.path import is_woven_by_controller
 from cellplan.files.cell.build.srdf import apply_srdfs
 from cellplan.files.cell.changes import changed, plain_values
 from cellplan.files.cell.layout.build_layout import read_layout
@@ -312,11 +313,18 @@ def _cell(
         checks=whole.checks,
         origin=origin,
         inputs=dict(sorted(sources.inputs.items())),
-        remarks=tuple(sources.remarks),
+        remarks=(*sources.remarks, *_weave_remarks(whole)),
         program=whole.program or NoTransfers(),
         controllers=whole.controllers or {},
         assign=whole.assign,
     )
+
+
+def _weave_remarks(whole: CellDocument) -> Iterator[tuple[str, str]]:
+    """Tasks whose controllers weave."""
+    for name, task in whole.tasks.items():
+        if task.path.weave is not None and is_woven_by_controller(task, whole):
+            yield f"tasks.{name}.path.weave", f"the controller of '{task.robot}' weaves, rows stay on the path"
 
 
 def _with_source(cell: Cell, source: CellFile) -> Cell:

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 from pydantic import ConfigDict, Field, Tag, model_validator
 
 from cellplan.files.schema.path import PathShapeEntry
-from cellplan.model.settings.entry import DIRECTION_WORDS, Name, Vector, by_kind, rule, setting
+from cellplan.model.settings.entry import DIRECTION_WORDS, Entry, Name, Vector, by_kind, rule, setting
 from cellplan.model.settings.units import Deg, Mm, Within
 
 WALL_WORDS: Final = f"surface, left, right, {DIRECTION_WORDS}"
@@ -22,6 +22,50 @@ WallChoice = Annotated[
     by_kind(WALL_WORDS, list=tuple),
 ]
 TravelAngle = Annotated[Deg, Within(ge=0.0, le=FLATTEST_DEG)]
+
+
+Length = Annotated[Mm, Within(gt=0.0, le=FARTHEST_MM)]
+Dwell = Annotated[float, Field(ge=0.0, le=10.0)]
+OF_FEED: Final = ("frequency_hz", "dwell_left_s", "dwell_right_s")  # keys whose lengths follow from the feed
+
+
+class WeaveEntry(Entry):
+    """How the tool tip swings about its path while it travels along it; the feed is that of travel."""
+
+    side_mm: Length = Field(description="Distance of each edge from the path, across travel and tool.")
+    form: Literal["sine", "zigzag", "triangle", "circle"] = setting(
+        "sine",
+        "Line of the weave: a sine; straight from edge to edge; straight from the root over both edges; round a centre "
+        "that travels along the path. The left edge comes first, as seen along the tool.",
+    )
+    wavelength_mm: Length | None = setting(
+        None, "Length of the path for one whole period, dwells included; excludes frequency_hz."
+    )
+    frequency_hz: Annotated[float, Field(gt=0.0, le=50.0)] | None = setting(
+        None, "Periods in a second at the feed of the process, dwells included."
+    )
+    dwell_left_s: Dwell = setting(0.0, "Time for which the tool travels along the left edge in each period.")
+    dwell_right_s: Dwell = setting(0.0, "Likewise along the right edge.")
+    out_mm: Length | None = setting(
+        None, "Distance of the edges of a triangle from the path, out of the part; required with triangle only."
+    )
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        """One period, and what its form has."""
+        if (self.wavelength_mm is None) == (self.frequency_hz is None):
+            got = "neither" if self.wavelength_mm is None else "both"
+            raise rule(f"expected either wavelength_mm or frequency_hz, got {got}")
+        if (self.out_mm is not None) != (self.form == "triangle"):
+            raise rule(
+                "missing, expected the distance of the edges from the path, out of the part"
+                if self.out_mm is None
+                else f"unexpected key, a weave of the form {self.form} stays at one distance",
+                "out_mm",
+            )
+        if self.form == "circle" and (self.dwell_left_s or self.dwell_right_s):
+            raise rule("expected no dwells, a circle has no edges", "form")
+        return self
 
 
 class PathEntry(PathShapeEntry):
@@ -56,6 +100,12 @@ class PathEntry(PathShapeEntry):
     drag_deg: TravelAngle | None = setting(None, "Travel angle of a tool that points against travel.")
     standoff_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_MM)] | None = setting(
         None, "Distance of the tool tip from the path, against the tool's own axis; 0 when absent."
+    )
+
+    weave: WeaveEntry | None = setting(
+        None,
+        "How the tool tip swings about the path. Where the controller of its robot has process statements with "
+        "weave_mm, the controller weaves: the rows stay on the path, and side_mm must be weave_mm.",
     )
 
     @model_validator(mode="after")

@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.files.schema.robot import Configuration
-from cellplan.files.schema.seam import PathEntry
+from cellplan.files.schema.seam import OF_FEED, PathEntry
 from cellplan.model.settings.checks import ToolDepth
 from cellplan.model.settings.entry import (
     DIRECTION_WORDS,
@@ -34,6 +34,7 @@ from cellplan.model.settings.task import (
 )
 from cellplan.model.settings.units import Deg, Mm, Within
 
+MOST_DWELL: Final = 0.8  # [-] of the period of a weave
 EXCLUDED_BY_PROCESS: Final = ("duration_s", "feed_mm_s", "time_law", "settle_s")
 
 Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
@@ -294,6 +295,24 @@ class TaskEntry(Entry):
         if self.standoff_mm is not None and self.standoff_mm[0] > self.standoff_mm[1]:
             low, high = (f"{value:g}" for value in self.standoff_mm)
             raise rule(f"expected [low, high], got [{low}, {high}]: the smaller distance comes first", "standoff_mm")
+        return self
+
+    @model_validator(mode="after")
+    def _agrees_with_weave(self) -> Self:
+        """Times of a weave become lengths by the feed of the process, and leave the tool some of each period."""
+        weave = self.path.weave
+        if weave is None:
+            return self
+        key = next((key for key in OF_FEED if getattr(weave, key)), None)
+        if self.process is None and key is not None:
+            raise rule("expected a process, whose feed says how long it is along the path", f"path.weave.{key}")
+        if self.process is not None:
+            length = weave.wavelength_mm or self.process.feed_mm_s / (weave.frequency_hz or 1.0)
+            period = length / self.process.feed_mm_s
+            dwells = weave.dwell_left_s + weave.dwell_right_s
+            if dwells > MOST_DWELL * period:
+                text = f"expected dwells of at most {MOST_DWELL:g} of the period of {period:.4g} s, got {dwells:.4g} s"
+                raise rule(text, f"path.weave.{'dwell_left_s' if weave.dwell_left_s else 'dwell_right_s'}")
         return self
 
     @property

@@ -1,5 +1,6 @@
 """Curves in space over a parameter: circles, straight sides, rounded corners and smooth curves through points."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final, Protocol
@@ -10,6 +11,7 @@ from cellplan.geometry.arrays import Array, Flags, Indices
 
 Interval = tuple[float | Array, float | Array]  # stretch of the parameter, one or one per point: see spans_at
 
+DIFFERENCE: Final = 2e-5  # [-] of a span: half the distance of the places from which a rate follows, to ten digits
 MOST_HALVINGS: Final = 16  # of a span that is fitted; the error falls to a sixteenth with each
 CORNER_CONTROLS: Final = np.array([-1.0, -0.6, -0.4, 0.4, 0.6, 1.0])  # [-] of a corner, see rounded_sides
 
@@ -119,6 +121,26 @@ def smooth_through(knots: Array, values: Array, *, breaks: Flags) -> BezierCurve
     width = np.diff(knots)[:, None]
     leaving, arriving = tangents(np.diff(values, axis=0) / width, width, breaks)
     return BezierCurve(knots=knots, control=cubic_controls(width, (values[:-1], values[1:]), (leaving, arriving)))
+
+
+def by_differences(
+    values: Callable[[Array, Interval], Array], knots: Array, u: Array, interval: Interval
+) -> tuple[Array, Array]:
+    """Values of a function that is smooth between knots, shape (N, 3), and their rates by three places of a span.
+
+    Args:
+        values: The function, at parameters of shape (M,) within an interval.
+        knots: Increasing parameters, shape (K + 1,).
+        u: Parameters, shape (N,), within ``interval``.
+    """
+    span = spans_at(knots, u, interval)
+    low, high = knots[span], knots[span + 1]
+    h = DIFFERENCE * (high - low)
+    x = np.clip(u, low + h, high - h)
+    within = np.tile(low, 4), np.tile(high, 4)
+    at_u, before, middle, after = np.split(values(np.concatenate([u, x - h, x, x + h]), within), 4)
+    h, off = h[:, None], (u - x)[:, None]
+    return at_u, (after - before) / (2.0 * h) + off * (after - 2.0 * middle + before) / h**2
 
 
 def cubic_fit(curve: Curve, *, tolerance: float) -> BezierCurve:

@@ -102,6 +102,11 @@ class Schedule:
         """Time between two samples in [s]."""
         return float(self.times[-1] / (len(self.times) - 1))
 
+    def woven(self, task: Task) -> ClockedPath | None:
+        """The path of a task whose tool weaves about it; None of one that does not, or whose weave is not known."""
+        paths = (path for path in self.paths if path.task.name == task.name)
+        return next((path for path in paths if path.toolpath.line is not None), None)
+
     @property
     def is_continuous(self) -> bool:
         """Whether the desired poses are known between the samples too."""

@@ -16,6 +16,7 @@ from cellplan.model.task.time_law import advance, reached_at, stand_off
 from cellplan.model.task.toolpath import TOOL_Z, Toolpath
 
 SAME_PLACE: Final = 1e-12  # [-] of the whole length: knots nearer to a stop lie on it
+INSTANT: Final = 1e-5  # [s] before and after a time: what the tool travels between gives its speed
 MOST_BREAKS: Final = 2_000_000  # smooth stretches of a motion; integration over more of them takes too long
 Spans = tuple[tuple[float, float], ...]
 
@@ -182,6 +183,29 @@ class ClockedPath:
         done = np.broadcast_to((s - self.behind[piece]) / np.diff(self.behind)[piece], stretch.shape)
         tau = reached_at(law, done, ramps[stretch])
         return (self.corners[stretch] + np.diff(self.corners)[stretch] * tau).ravel()
+
+
+def on_line(path: ClockedPath, travelled: Array) -> tuple[Array, Array]:
+    """Points of a path without its weave, and how far the weave leads the tip from them.
+
+    Args:
+        travelled: Lengths in [m] behind the tool, which grow from cycle to cycle, shape (N,).
+
+    Returns:
+        Both in [m], shape (N, 3), expressed in P.
+    """
+    toolpath = path.toolpath
+    s = travelled - toolpath.length * np.clip(travelled // toolpath.length, 0, path.task.repeat - 1)
+    points: Array = toolpath.without_weave.poses(s)[:, :3, 3]
+    return points, np.zeros_like(points) if toolpath.line is None else toolpath.poses(s)[:, :3, 3] - points
+
+
+def travel_speeds(path: ClockedPath, times: Array) -> Array:
+    """Speed in [m/s] along the path, without a weave, at times in [s], shape (N,)."""
+    if path.toolpath.line is None:
+        return np.asarray(np.linalg.norm(path.targets(times)[1][:, :3], axis=1))
+    low, high = (path.targets(np.clip(times + h, path.start, path.end))[2] for h in (-INSTANT, INSTANT))
+    return (high - low) / (2.0 * INSTANT)
 
 
 def distinct(times: Array) -> Array:

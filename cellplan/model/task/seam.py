@@ -1,4 +1,4 @@
-"""Seam: walls beside a path as the user states them, and how the tool is held to them."""
+"""Seam: walls beside a path as the user states them, how the tool is held to them, and how it weaves."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,3 +28,23 @@ class Seam:
 
     walls: Mapping[str, Array | WallPlace]
     angles: SeamAngles
+
+
+class WeaveForm(StrEnum):
+    """Line of a weave."""
+
+    SINE = "sine"
+    ZIGZAG = "zigzag"  # straight from edge to edge
+    TRIANGLE = "triangle"  # straight from the root over both edges, which are farther out
+    CIRCLE = "circle"  # round a centre that travels along the seam
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weave:
+    """How a tip swings about its seam: one wavelength, with lengths in [m]."""
+
+    form: WeaveForm
+    side: float  # from the seam to each edge, across travel and tool
+    wavelength: float  # length of the seam for one whole period, dwells included
+    dwells: tuple[float, float] = (0.0, 0.0)  # length for which it travels along the left and the right edge
+    out: float = 0.0  # distance of the edges from the seam, out of the part: of a triangle

@@ -1,6 +1,6 @@
 """Toolpath: where the tool must be on the part, before any robot or clock is involved."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -22,7 +22,7 @@ class Toolpath:
         name: Name of the task.
         tip: Curve of the tool tip in P.
         orientation: Orientation of the tool in P, before its rotation about its own axis.
-        arc: Length along the tip curve.
+        arc: Length along the tip curve, or along the line that the tip weaves about.
         stops: Parameters of the tip curve between which the pieces lie, shape (pieces + 1,).
         turn: Angle in [rad] by which the tool turns about its own z axis, uniformly over the whole length.
         is_closed: Whether the last piece ends in the pose in which the first starts, but for the turn.
@@ -32,6 +32,7 @@ class Toolpath:
             times and may stand still.
         bulge: Largest distance in [m] of a smooth curve from the straight lines between its points, before it is
             projected; None for other curves.
+        line: Curve that the tip weaves about, along which length and feed are measured; None where it does not weave.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Toolpath:
     stand_off: float = 0.0
     is_timed: bool = False
     bulge: float | None = None
+    line: Curve | None = None
 
     def __repr__(self) -> str:
         """One line without arrays."""
@@ -54,6 +56,11 @@ class Toolpath:
     def length(self) -> float:
         """Length of the whole path on the surface in [m]."""
         return self.arc.total
+
+    @property
+    def without_weave(self) -> "Toolpath":
+        """The same with the tip on the line that it weaves about."""
+        return self if self.line is None else replace(self, tip=self.line, line=None)
 
     @property
     def duration(self) -> float:
@@ -118,8 +125,9 @@ class Toolpath:
         interval = (self.stops[pieces], self.stops[pieces + 1])
         u = (quick or self.arc).parameters(s, interval)
         p, dp = self.tip.evaluate(u, interval)
-        R, w = self.orientation.frames(u, interval, p=p, dp=dp)
-        twists = np.concatenate([dp, w], axis=1) / np.linalg.norm(dp, axis=1, keepdims=True)
+        on_line, along = (p, dp) if self.line is None else self.line.evaluate(u, interval)
+        R, w = self.orientation.frames(u, interval, p=on_line, dp=along)
+        twists = np.concatenate([dp, w], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
         if self.turn:
             R = R @ rotation_about(TOOL_Z, self.turn / self.length * np.clip(s, 0.0, self.length))
             twists[:, 3:] += self.turn / self.length * R[:, :, 2]

@@ -25,6 +25,7 @@ from cellplan.planning.path.curve import PathCurve, path_curve
 from cellplan.planning.path.formatting import MM, direction_name, in_mm, length
 from cellplan.planning.path.projection import along, project_path
 from cellplan.planning.path.seam import follow_seam
+from cellplan.planning.path.weave import woven_path
 
 STANDSTILL: Final = 1e-4  # [-] of the largest speed by the parameter: a curve slower than this has a cusp there
 SAME_POSE: Final = 1e-9  # [m], [-] entries of poses that differ by less are those of one pose
@@ -50,20 +51,14 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
     """
     outline = path_curve(task)
     refuse_path_in_metres(outline.curve, task=task, part=part)
-    curve = project_path(outline, task, part)
-    if task.seam is None:
-        orientation = orient_tool(task, curve)
-    else:
-        curve, axes = follow_seam(task, curve, task.seam.angles)
-        orientation = _by_axes(axes, task, curve)
+    curve, orientation = _with_tool(task, project_path(outline, task, part))
     arc = measure(curve.curve)
     refuse_unlikely_path(curve.curve, arc, task=task, part=part)
-    if task.spin:
-        orientation = SpunFrame(frame=orientation, angle=task.spin)
     is_timed = isinstance(task.path, TimedPath)
     if not is_timed:
         _refuse_standstill(curve.curve, arc, task.where("path"))
-    is_closed = curve.is_closed and _comes_back(curve.curve, orientation, curve.stops)
+    tip = curve.curve if task.weave is None else woven_path(task, task.weave, curve, arc, orientation)
+    is_closed = curve.is_closed and _comes_back(tip, orientation, curve.stops)
     if task.repeat > 1 and not is_closed:
         raise InputError(
             f"{task.where('repeat')}: expected 1 for a path that does not end in the pose of its "
@@ -71,7 +66,8 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
         )
     toolpath = Toolpath(
         name=task.name,
-        tip=curve.curve,
+        tip=tip,
+        line=None if task.weave is None else curve.curve,
         orientation=orientation,
         arc=arc,
         stops=curve.stops,
@@ -85,6 +81,16 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
     if not is_rigid(toolpath.spread(PROBES)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")
     return toolpath
+
+
+def _with_tool(task: Task, path: PathCurve) -> tuple[PathCurve, Orientation]:
+    """The curve of the tip, and the orientation of the tool along it."""
+    if task.seam is None:
+        curve, orientation = path, orient_tool(task, path)
+    else:
+        curve, axes = follow_seam(task, path, task.seam.angles)
+        orientation = _by_axes(axes, task, curve)
+    return curve, SpunFrame(frame=orientation, angle=task.spin) if task.spin else orientation
 
 
 def _comes_back(tip: Curve, orientation: Orientation, stops: Array) -> bool:

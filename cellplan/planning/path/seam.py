@@ -1,6 +1,5 @@
 """Tools along seams: axes that follow the walls beside a path, and the tip's distance from it."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
-from cellplan.geometry.curves.curve import Curve, Interval, cubic_fit, spans_at
+from cellplan.geometry.curves.curve import Curve, Interval, by_differences, cubic_fit
 from cellplan.geometry.curves.seam_line import SeamAngles, SeamLine, tool_axes
 from cellplan.geometry.transforms import cross
 from cellplan.model.task.seam import WallPlace
@@ -17,12 +16,9 @@ from cellplan.planning.path.curve import PathCurve
 from cellplan.planning.path.formatting import in_mm
 from cellplan.planning.path.projection import along
 
-DIFFERENCE: Final = 2e-5  # [-] of a span: half the distance of the places from which a rate follows, to ten digits
 STEEPEST_WALL: Final = np.deg2rad(45.0)  # [rad] of a wall to the seam: it would not stand beside it any more
 NO_JUMP: Final = 1e-7  # [rad] between the axes on both sides of a corner: rounding of directions in files
 FIT: Final = 1e-8  # [m] of a line beside a seam
-
-Walls = Callable[[Array, Array, Interval], SeamLine]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,15 +36,11 @@ class SeamAxes:
 
     def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:
         """Unit axes into the part and their rates, from three places of the same smooth span."""
-        span = spans_at(self.knots, u, interval)
-        low, high = self.knots[span], self.knots[span + 1]
-        h = DIFFERENCE * (high - low)
-        x = np.clip(u, low + h, high - h)
-        places = np.concatenate([u, x - h, x, x + h])
-        within = (np.tile(low, 4), np.tile(high, 4))
-        a, before, middle, after = np.split(tool_axes(self.line(places, within), self.angles), 4)
-        h, off = h[:, None], (u - x)[:, None]
-        return a, (after - before) / (2.0 * h) + off * (after - 2.0 * middle + before) / h**2
+        return by_differences(self._axes, self.knots, u, interval)
+
+    def _axes(self, u: Array, interval: Interval) -> Array:
+        """The axes alone."""
+        return tool_axes(self.line(u, interval), self.angles)
 
     def line(self, u: Array, interval: Interval) -> SeamLine:
         """The seam at parameters of shape (N,)."""

@@ -361,7 +361,12 @@ def _piece_ends(path: ToolPath, rows: RobotRows, both: tuple[int, int], corners:
 def _feed(path: ToolPath, rows: RobotRows, between: tuple[int, int, int]) -> float:
     """Speed of a tool in [m/s] between two rows of a phase: what its task states, or the greatest of the run."""
     start, first, last = between
-    if path.task.feed is not None and rows.process is not None and rows.process[start + first]:
+    if (
+        path.task.feed is not None
+        and path.task.weave is None
+        and rows.process is not None
+        and rows.process[start + first]
+    ):
         return path.task.feed
     steps = np.linalg.norm(np.diff(path.X_PT[first : last + 1, :3, 3], axis=0), axis=1)
     speed = float(np.max(steps / np.diff(times_of(rows)[start + first : start + last + 1])))

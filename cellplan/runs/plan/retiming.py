@@ -18,7 +18,7 @@ from cellplan.model.motion.joint_path import JointPath
 from cellplan.model.motion.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.settings.units import si_or_none
-from cellplan.model.task.clocked_path import ClockedPath, fixed_rests
+from cellplan.model.task.clocked_path import ClockedPath, fixed_rests, travel_speeds
 from cellplan.model.task.task import Task
 from cellplan.planning.timing.fixed_rates import FixedRate
 from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
@@ -268,9 +268,8 @@ class RowLimits:
         share = np.zeros(len(sigma))
         for path in self.paths:
             if path.task.feed is not None:
-                twists = path.targets(sigma)[1]
                 is_moving = (sigma >= path.start) & (sigma <= path.end)
-                share = np.maximum(share, is_moving * np.linalg.norm(twists[:, :3], axis=1) / path.task.feed)
+                share = np.maximum(share, is_moving * travel_speeds(path, sigma) / path.task.feed)
             for begin, end in fixed_rests(path.task, path.corners):
                 share = np.maximum(share, (sigma >= begin) & (sigma <= end))
         if self.errors is not None:

@@ -115,3 +115,86 @@ def test_file_with_axes_is_refused_beside_a_seam(refuse: Refuse, tmp_path: Path)
     assert refuse(path("walls: {floor: +z}", "csv: p.csv")) == [
         "c:19: tasks.ring.path: expected no walls and angles beside p.csv, which gives the tool's orientation already"
     ]
+
+
+WELD = "    process: {feed_mm_s: 8}\n"
+
+
+def test_times_of_a_weave_become_lengths_at_the_feed(load: Load) -> None:
+    words = "walls: {floor: +z}, weave: {side_mm: 3, frequency_hz: 2, dwell_left_s: 0.1, dwell_right_s: 0.05}"
+    weave = load(path(words, rest=WELD), ("motion: {duration_s: 4}", "motion: {}")).tasks[0].weave
+    assert weave is not None
+
+    assert (weave.form, weave.side, weave.wavelength) == ("sine", 0.003, pytest.approx(0.004, rel=1e-15))
+    assert weave.dwells == pytest.approx((0.0008, 0.0004), rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("weave", "message"),
+    [
+        ("side_mm: 3", "c:19: tasks.ring.path.weave: expected either wavelength_mm or frequency_hz, got neither"),
+        (
+            "side_mm: 3, wavelength_mm: 4, form: triangle",
+            "c:19: tasks.ring.path.weave.out_mm: missing, expected the distance of the edges from the path, out of the "
+            "part",
+        ),
+        (
+            "side_mm: 3, wavelength_mm: 4, out_mm: 2",
+            "c:19: tasks.ring.path.weave.out_mm: unexpected key, a weave of the form sine stays at one distance",
+        ),
+        (
+            "side_mm: 3, wavelength_mm: 4, form: circle, dwell_left_s: 0.1",
+            "c:19: tasks.ring.path.weave.form: expected no dwells, a circle has no edges",
+        ),
+        (
+            "side_mm: 3, wavelength_mm: 4, form: sinus",
+            "c:19: tasks.ring.path.weave.form: expected sine, zigzag, triangle or circle, got 'sinus', "
+            "did you mean 'sine'?",
+        ),
+        (
+            "side_mm: 3, wavelength_mm: 4, dwell_left_s: 0.5",
+            "c:19: tasks.ring.path.weave.dwell_left_s: expected dwells of at most 0.8 of the period of 0.5 s, got "
+            "0.5 s",
+        ),
+    ],
+)
+def test_words_that_make_no_weave_are_refused(refuse: Refuse, weave: str, message: str) -> None:
+    assert refuse(path(f"walls: {{floor: +z}}, weave: {{{weave}}}", rest=WELD)) == [message]
+
+
+def test_times_of_a_weave_need_a_feed(refuse: Refuse) -> None:
+    assert refuse(path("walls: {floor: +z}, weave: {side_mm: 3, frequency_hz: 2}")) == [
+        "c:19: tasks.ring.path.weave.frequency_hz: expected a process, whose feed says how long it is along the path"
+    ]
+
+
+CONTROLLER = """\
+controllers:
+  welder:
+    kind: abb
+    process:
+      on: 'ArcLStart {point}, {speed}, seam1, weld1 \\Weave:=weave1, {zone}, {tool} \\WObj:={frame};'
+      inner: 'ArcL {point}, {speed}, seam1, weld1 \\Weave:=weave1, {zone}, {tool} \\WObj:={frame};'
+      off: 'ArcLEnd {point}, {speed}, seam1, weld1 \\Weave:=weave1, {zone}, {tool} \\WObj:={frame};'
+      weave_mm: 2
+"""
+
+
+def woven_by_controller(side: float) -> tuple[tuple[str, str], ...]:
+    weave = f"walls: {{floor: +z}}, weave: {{side_mm: {side:g}, wavelength_mm: 4}}"
+    control = ("    model: abb_irb1600\n", "    model: abb_irb1600\n    controller: {id: welder}\n")
+    whole = ("motion: {duration_s: 4}\n", f"motion: {{}}\n{CONTROLLER}")
+    return path(weave, rest=WELD), control, whole
+
+
+def test_controller_that_weaves_leaves_the_rows_on_the_path(load: Load) -> None:
+    cell = load(*woven_by_controller(2))
+
+    assert cell.tasks[0].weave is None
+    assert ("tasks.ring.path.weave", "the controller of 'worker' weaves, rows stay on the path") in cell.remarks
+
+
+def test_controller_that_weaves_by_another_amplitude_is_refused(refuse: Refuse) -> None:
+    assert refuse(*woven_by_controller(3)) == [
+        "c:20: tasks.ring.path.weave.side_mm: expected 2, as controllers.welder.process.weave_mm weaves, got 3"
+    ]

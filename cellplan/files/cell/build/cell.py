@@ -137,7 +137,7 @@ def build_task(
     return Task(
         name=name,
         robot=entry.robot,
-        **path_fields(name, entry.path, read_targets),
+        **path_fields(name, document, read_targets),
         tool_axis=None if tool_axis is None else direction(tool_axis),
         tool_x=direction(tool_x),
         spin=entry.spin_deg.si,

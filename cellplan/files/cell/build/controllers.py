@@ -11,7 +11,7 @@ from cellplan.files.yaml.reader import YamlDocument
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.settings.process_statements import read_statement
-from cellplan.model.settings.units import si_or_none
+from cellplan.model.settings.units import Mm, si_or_none
 
 ARM: Final = 6  # axes of an arm, the last ones of a robot with as many joints or more
 EXTERNAL: Final = 6  # external axes that a row of these programs holds
@@ -54,6 +54,7 @@ def control_findings(
                 yield from _joints((*path, "id"), entry, models[name], document)
     yield from _process_data(valid, document)
     yield from _process_delays(valid, document)
+    yield from _process_weaves(valid, document)
     yield from _without_robots(valid, document)
     yield from _stop(valid, document)
 
@@ -212,6 +213,17 @@ def _process_delays(valid: ValidEntries, document: YamlDocument) -> Iterator[Fin
                     lead = f"controllers.{name}.process.{key.replace('delay', 'lead')}"
                     text = f"expected 0, as {lead} switches its output ahead, got {delay:g}; state one of both"
                     yield document.finding(("tasks", task, "process", key), text)
+
+
+def _process_weaves(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
+    """A task that weaves does so as far as its controller, where that one weaves."""
+    for name, entry in valid.controllers.items():
+        most = Mm(0.0) if entry.process is None else entry.process.weave_mm
+        for task in _in_process(name, valid) if most > 0.0 else ():
+            weave = valid.tasks[task].path.weave
+            if weave is not None and weave.side_mm != most:
+                text = f"expected {most:g}, as controllers.{name}.process.weave_mm weaves, got {weave.side_mm:g}"
+                yield document.finding(("tasks", task, "path", "weave", "side_mm"), text)
 
 
 def _in_process(controller: str, valid: ValidEntries) -> Iterator[str]:

@@ -5,14 +5,16 @@ from typing import TypedDict
 
 import numpy as np
 
+from cellplan.files.schema.cell import CellDocument
 from cellplan.files.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
 from cellplan.files.schema.path import PathShapeEntry, PolylineEntry
-from cellplan.files.schema.seam import SURFACE, PathEntry
+from cellplan.files.schema.seam import SURFACE, PathEntry, WeaveEntry
+from cellplan.files.schema.task import TaskEntry
 from cellplan.files.shapes import direction
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.curves.seam_line import SeamAngles
 from cellplan.model.settings.units import Deg, Mm
-from cellplan.model.task.seam import Seam, WallPlace
+from cellplan.model.task.seam import Seam, WallPlace, Weave, WeaveForm
 from cellplan.model.task.task import (
     CirclePath,
     PathSpec,
@@ -32,15 +34,19 @@ class PathFields(TypedDict):
 
     path: PathSpec
     seam: Seam | None
+    weave: Weave | None
     project: Array | None
     plane_offset: float
 
 
-def path_fields(name: str, entry: PathEntry, read_targets: TargetReader) -> PathFields:
-    """Geometry of a path, how the tool is held to walls, and its projection or place."""
+def path_fields(name: str, document: CellDocument, read_targets: TargetReader) -> PathFields:
+    """Geometry of a path, how the tool is held to walls and weaves, and its projection or place."""
+    task = document.tasks[name]
+    entry = task.path
     return PathFields(
         path=_path(name, entry, read_targets),
         seam=_seam(entry),
+        weave=None if entry.weave is None or is_woven_by_controller(task, document) else _weave(entry.weave, task),
         project=None if entry.project is None else direction(entry.project),
         plane_offset=(entry.offset_mm or Mm(0.0)).si,
     )
@@ -113,4 +119,23 @@ def _seam(entry: PathEntry) -> Seam | None:
             travel=(entry.push_deg or Deg(0.0)).si - (entry.drag_deg or Deg(0.0)).si,
             standoff=(entry.standoff_mm or Mm(0.0)).si,
         ),
+    )
+
+
+def is_woven_by_controller(task: TaskEntry, document: CellDocument) -> bool:
+    """Whether the controller of a task's robot weaves by itself while its process is on."""
+    control = document.robots[task.robot].controller
+    entry = None if control is None else (document.controllers or {}).get(control.id)
+    return task.process is not None and entry is not None and entry.process is not None and entry.process.weave_mm > 0.0
+
+
+def _weave(entry: WeaveEntry, task: TaskEntry) -> Weave:
+    """A weave with lengths for its times, at the feed of the process."""
+    feed = 0.0 if task.process is None else task.process.feed_mm_s.si
+    return Weave(
+        form=WeaveForm(entry.form),
+        side=entry.side_mm.si,
+        wavelength=entry.wavelength_mm.si if entry.wavelength_mm is not None else feed / (entry.frequency_hz or 1.0),
+        dwells=(feed * entry.dwell_left_s, feed * entry.dwell_right_s),
+        out=(entry.out_mm or Mm(0.0)).si,
     )

@@ -120,7 +120,7 @@ def task_goals(cell: Cell, robots: Mapping[str, Sequence[str]]) -> list[TaskGoal
     clocked = clock_paths(cell, toolpaths)
     goals = []
     for task, toolpath in zip(cell.tasks, toolpaths, strict=True):
-        on_path = toolpath.spread(2 * SAMPLES - 1 if toolpath.is_closed else SAMPLES)
+        on_path = toolpath.without_weave.spread(2 * SAMPLES - 1 if toolpath.is_closed else SAMPLES)
         ends = on_path[[0, -1]].copy()
         for end, move in zip(ends, (task.approach, task.retract), strict=True):
             end[:3, 3] -= (0.0 if move is None else move.distance) * end[:3, 2]

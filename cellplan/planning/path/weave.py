@@ -1,0 +1,174 @@
+"""Weave: a tip that swings about its seam while it travels along it."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.geometry.arrays import Array
+from cellplan.geometry.curves.arc_length import ArcLength
+from cellplan.geometry.curves.curve import BezierCurve, Curve, Interval, by_differences, cubic_fit
+from cellplan.geometry.curves.orientation import Orientation
+from cellplan.geometry.transforms import cross
+from cellplan.model.task.seam import Weave, WeaveForm
+from cellplan.model.task.task import Task, TimeLaw, TimeLawKind
+from cellplan.model.task.time_law import advance
+from cellplan.planning.path.curve import PathCurve
+from cellplan.planning.path.formatting import in_mm
+
+TURN: Final = 0.1  # [-] of a stroke from edge to edge, in which it comes to its speed or from it
+STROKE_LAW: Final = TimeLaw(kind=TimeLawKind.STEADY, ramp=TURN)
+DIRECTION_FIT: Final = 1e-7  # [-] of unit vectors across a seam: a weave of 10 mm is off by a nanometre
+SAME_KNOT: Final = 1e-9  # [-] of a wavelength: knots nearer to one another are one, but for rounding
+NO_JUMP: Final = 1e-7  # [m] of a tip at a corner
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Strokes:
+    """One wavelength of a weave as strokes between points of the cross-section, and rests at its edges."""
+
+    ends: Array  # length in [m] at which each stroke begins, and the one at which the last ends, shape (K + 1,)
+    points: Array  # where each begins, and where the last ends: along the seam, left, out in [m], shape (K + 1, 3)
+    lead: float  # length in [m] of the first stroke that lies before the start of the seam
+
+    @classmethod
+    def of(cls, weave: Weave) -> "_Strokes":
+        """From edge to edge, from the middle of a stroke on; of a triangle from its root over both edges."""
+        left, right = ([0.0, side * weave.side, weave.out] for side in (1.0, -1.0))
+        moving = weave.wavelength - sum(weave.dwells)
+        if weave.form is WeaveForm.TRIANGLE:
+            lead, stroke, points = 0.0, moving / 3.0, [[0.0] * 3, left, left, right, right, [0.0] * 3]
+            lengths = [stroke, weave.dwells[0], stroke, weave.dwells[1], stroke]
+        else:
+            lead, stroke, points = 0.25 * moving, 0.5 * moving, [right, left, left, right, right]
+            lengths = [stroke, weave.dwells[0], stroke, weave.dwells[1]]
+        is_long = np.append(True, np.array(lengths) > 0.0)
+        return cls(np.append(0.0, np.cumsum(lengths))[is_long], np.array(points)[is_long], lead)
+
+
+def weave_offsets(weave: Weave, s: Array) -> tuple[Array, Array]:
+    """Where the tip is from the seam: along it, to its left and out of it.
+
+    Args:
+        s: Lengths in [m] from the start of the seam, shape (N,).
+
+    Returns:
+        Offsets in [m] and their change per length, shape (N, 3) each.
+    """
+    if weave.form is WeaveForm.CIRCLE:
+        angle, k = 2.0 * np.pi * s / weave.wavelength, 2.0 * np.pi / weave.wavelength
+        cosine, sine, zero = np.cos(angle), np.sin(angle), np.zeros_like(s)
+        return weave.side * np.stack([cosine, sine, zero], 1), k * weave.side * np.stack([-sine, cosine, zero], 1)
+    strokes = _Strokes.of(weave)
+    phase = np.mod(s + strokes.lead, weave.wavelength)
+    stroke = np.clip(np.searchsorted(strokes.ends, phase, side="right") - 1, 0, len(strokes.ends) - 2)
+    width = np.diff(strokes.ends)[stroke]
+    share = np.clip((phase - strokes.ends[stroke]) / width, 0.0, 1.0)
+    if weave.form is WeaveForm.SINE:
+        done, rate = 0.5 - 0.5 * np.cos(np.pi * share), 0.5 * np.pi * np.sin(np.pi * share)
+    else:
+        law = advance(STROKE_LAW, share)
+        done, rate = law.share, law.rate
+    move = np.diff(strokes.points, axis=0)[stroke]
+    return strokes.points[stroke] + done[:, None] * move, (rate / width)[:, None] * move
+
+
+def weave_knots(weave: Weave, length: float) -> Array:
+    """Lengths in [m] from the start of a seam at which a weave is joined, up to its end, shape (M,)."""
+    if weave.form is WeaveForm.CIRCLE:
+        inside, lead = np.linspace(0.0, weave.wavelength, 5)[:-1], 0.0
+    else:
+        strokes = _Strokes.of(weave)
+        ends, lead = strokes.ends, strokes.lead
+        ramps = TURN * np.diff(ends) if weave.form is not WeaveForm.SINE else np.zeros(len(ends) - 1)
+        inside = np.unique(np.concatenate([ends[:-1], ends[:-1] + ramps, ends[1:] - ramps]))
+        inside = inside[inside < ends[-1]]
+    periods = np.arange(int(np.ceil((length + lead) / weave.wavelength)))[:, None] * weave.wavelength
+    knots = np.sort((periods + inside).ravel() - lead)
+    apart = SAME_KNOT * weave.wavelength
+    return knots[(knots > apart) & (knots < length - apart) & (np.diff(knots, prepend=-np.inf) > apart)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _AcrossSeam:
+    """A unit vector along or across a seam: along it, to its left seen along the tool, or out of it."""
+
+    line: Curve
+    orientation: Orientation
+    which: int
+
+    @property
+    def knots(self) -> Array:
+        """Those of the seam and of the orientation."""
+        first, last = self.line.knots[[0, -1]]
+        knots = np.union1d(self.line.knots, self.orientation.knots)
+        return knots[(knots >= first) & (knots <= last)]
+
+    def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:
+        """Vectors and their rates, see `cellplan.geometry.curves.curve.Curve`."""
+        return by_differences(self._vectors, self.knots, u, interval)
+
+    def _vectors(self, u: Array, interval: Interval) -> Array:
+        """The vectors at parameters of shape (N,)."""
+        p, dp = self.line.evaluate(u, interval)
+        t = dp / np.linalg.norm(dp, axis=1, keepdims=True)
+        z = self.orientation.frames(u, interval, p=p, dp=dp)[0][:, :, 2]
+        out = np.sum(z * t, axis=1, keepdims=True) * t - z
+        out /= np.linalg.norm(out, axis=1, keepdims=True)
+        return (t, cross(out, t), out)[self.which]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WovenCurve:
+    """The curve of a tip that weaves about its seam; see `cellplan.geometry.curves.curve.Curve`."""
+
+    line: Curve  # the seam
+    arc: ArcLength  # its length
+    weave: Weave
+    directions: tuple[tuple[int, BezierCurve], ...]  # unit vectors of the offsets that are not zero
+    knots: Array
+
+    @classmethod
+    def of(cls, line: Curve, arc: ArcLength, weave: Weave, orientation: Orientation) -> "WovenCurve":
+        """Weave about a line with a length, across a tool with an orientation along it."""
+        moves = np.array([weave.form is WeaveForm.CIRCLE, True, weave.out > 0.0])
+        directions = tuple(
+            (k, cubic_fit(_AcrossSeam(line=line, orientation=orientation, which=k), tolerance=DIRECTION_FIT))
+            for k in np.flatnonzero(moves).tolist()
+        )
+        whole = (float(line.knots[0]), float(line.knots[-1]))
+        joints = arc.parameters(weave_knots(weave, arc.total), whole)
+        knots = np.unique(np.concatenate([joints, *(curve.knots for _, curve in directions)]))
+        return cls(line=line, arc=arc, weave=weave, directions=directions, knots=knots)
+
+    def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:
+        """Points and derivatives."""
+        p, dp = self.line.evaluate(u, interval)
+        speed = np.linalg.norm(dp, axis=1, keepdims=True)
+        offsets, rates = weave_offsets(self.weave, self.arc.lengths(u))
+        for k, curve in self.directions:
+            d, dd = curve.evaluate(u, interval)
+            p = p + offsets[:, k, None] * d
+            dp = dp + speed * rates[:, k, None] * d + offsets[:, k, None] * dd
+        return p, dp
+
+
+def woven_path(task: Task, weave: Weave, drawing: PathCurve, arc: ArcLength, orientation: Orientation) -> WovenCurve:
+    """The curve of a tip that weaves about the path of a task.
+
+    Raises:
+        InputError: The tip would jump at a corner.
+    """
+    curve = WovenCurve.of(drawing.curve, arc, weave, orientation)
+    stops = drawing.stops
+    for before, here, after in zip(stops[:-2], stops[1:-1], stops[2:], strict=True):
+        u = np.array([here])
+        sides = [curve.evaluate(u, interval)[0][0] for interval in ((before, here), (here, after))]
+        if np.linalg.norm(sides[1] - sides[0]) > NO_JUMP:
+            raise InputError(
+                f"{task.where('path.weave')}: expected corners that are rounded, as a weave across each side "
+                f"would jump at {in_mm(drawing.curve.evaluate(u, (before, here))[0][0])}; write corners: "
+                "{blend_mm: 5}"
+            )
+    return curve
