@@ -223,15 +223,17 @@ def short(places: set[str]) -> list[str]:
 
 
 def test_every_engine_is_a_declared_dependency() -> None:
-    """Extras read xacro files, talk to a cluster, write DXF, PNG and PDF, make frames: only who does so needs them."""
+    """Extras read xacro and STEP files, talk to a cluster, write DXF, make frames: only who does so needs them."""
     extras = CONFIGURATION["project"]["optional-dependencies"]
     further = [
-        requirement for name in ("assign", "xacro", "cluster", "plots", "dxf", "frames") for requirement in extras[name]
+        requirement
+        for name in ("assign", "xacro", "cluster", "plots", "dxf", "frames", "step")
+        for requirement in extras[name]
     ]
     requirements = [*CONFIGURATION["project"]["dependencies"], *further]
     declared = {re.split(r"[<>=!~ \[]", requirement)[0].lower() for requirement in requirements}
     package_of = {"pinocchio": "pin", "fcl": "python-fcl", "yaml": "pyyaml", "pydantic_core": "pydantic"}
-    package_of["collada"] = "pycollada"
+    package_of |= {"collada": "pycollada", "OCP": "cadquery-ocp-novtk"}
 
     used = {name for path in SOURCES for name in imported_modules(path)} - sys.stdlib_module_names - {"cellplan"}
 

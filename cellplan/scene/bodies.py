@@ -40,8 +40,9 @@ class SceneBody:
     robot: str | None  # the robot that moves it; None when it is fixed in the world
     link: int  # the link of that robot it is fixed to
     X_BS: Array  # its pose at the reference configuration in the robot's base frame, or in the world
-    # how far the real thing may stick out of it in [m]; None when it is not stated. What the user draws (tools, part,
-    # attachments, pedestals, surroundings) is taken as exact.
+    # how far the real thing may stick out of it in [m]; None when it is not stated. What the user draws (tools,
+    # attachments, pedestals, surroundings) is taken as exact; of a part from a STEP file it is the deviation of the
+    # mesh.
     accuracy: float | None = 0.0
 
     @property
@@ -149,7 +150,8 @@ def _carried(robot: Robot, kind: Kind, body: Body, *, accuracy: float | None = 0
 def part_body(cell: Cell, part: Part, grasp: Grasp | None = None) -> SceneBody:
     """The part, carried by one of its holders or fixed in the world."""
     if grasp is None:
-        return _fixed("part", Kind.PART, shape=part.shape, X_WS=part.X_CP @ part.X_PS)
+        fixed = _fixed("part", Kind.PART, shape=part.shape, X_WS=part.X_CP @ part.X_PS)
+        return replace(fixed, accuracy=part.accuracy)
     holder = cell.robot(grasp.robot)
     return SceneBody(
         name="part",
@@ -158,6 +160,7 @@ def part_body(cell: Cell, part: Part, grasp: Grasp | None = None) -> SceneBody:
         robot=holder.name,
         link=holder.model.flange_link,
         X_BS=holder.model.X_BF @ holder.tool.X_FT @ inverse(grasp.X_PT) @ part.X_PS,
+        accuracy=part.accuracy,
     )
 
 

@@ -14,18 +14,22 @@ from cellplan.model.units import MM
 
 def check_depths(cell: Cell, depths: Sequence[ToolDepth]) -> list[Check]:
     """The depth of each task's tool against what the task, or else the cell, allows."""
-    return [_depth_check(cell.task(depth.task), depth) for depth in depths]
+    added = cell.part.accuracy if cell.checks.adds_accuracy else 0.0
+    return [_depth_check(cell.task(depth.task), depth, added) for depth in depths]
 
 
-def _depth_check(task: Task, tool_depth: ToolDepth) -> Check:
-    depth, limit = MM * tool_depth.depth, MM * tool_depth.limit
-    passed = tool_depth.depth <= tool_depth.limit + DEPTH_TOL
+def _depth_check(task: Task, tool_depth: ToolDepth, added: float) -> Check:
+    """Whether a depth is allowed, where that of a tool that touches the part is raised by its accuracy in [m]."""
+    raised = tool_depth.depth + (added if tool_depth.depth > 0.0 else 0.0)
+    depth, limit = MM * raised, MM * tool_depth.limit
+    passed = raised <= tool_depth.limit + DEPTH_TOL
     what = "its axis" if tool_depth.body == AXIS else f"{tool_depth.robot}/{tool_depth.body}"
     when = " on its path" if tool_depth.at_s is None else f" at {tool_depth.at_s:.3f} s"
     message = (
         f"tool depth of task '{task.name}': {depth:.3g} mm of the tool is inside the part or beyond it{when} ({what}), "
         f"allowed {limit:g} mm"
     )
+    message += f" (with {MM * added:g} mm for the accuracy of the part)" if raised > tool_depth.depth else ""
     message = message if passed else f"{message}; {', or '.join(_cures(task, tool_depth))}"
     return Check("tool_depth", task.name, passed, message, value=depth, limit=limit, unit="mm", at_s=tool_depth.at_s)
 

@@ -274,6 +274,8 @@ def _read_meshes(valid: ValidEntries, sources: Sources) -> None:
         shapes += [(("robots", name, "mount", "rail", key, index), it) for key, index, it in rail_entries(robot)]
         shapes += [((*place, "geometry"), robot.tool.geometry)] if robot.tool.geometry is not None else []
     part = valid.part.geometry if valid.part is not None else None
+    if valid.part is not None and valid.part.step is not None:
+        sources.read_part(valid.part.step)
     if part is not None and part.mesh is not None:
         sources.mesh(part.mesh, part.unit, ("part", "geometry", "mesh"), requirement=require_solid)
     for path, shape in shapes:
@@ -305,7 +307,7 @@ def _cell(
     return Cell(
         name=whole.name,
         robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
-        part=build_part(whole, models, mesh),
+        part=build_part(whole, models, mesh, sources.part),
         tasks=tuple(build_task(name, whole, models, targets.__getitem__, origin) for name in whole.tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),
         motion=build_motion(whole.motion),

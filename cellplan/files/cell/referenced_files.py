@@ -5,7 +5,7 @@ import posixpath
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
@@ -18,10 +18,14 @@ from cellplan.files.robots.rules import limits_in_si, tightened
 from cellplan.files.robots.urdf import XACRO_SUFFIX
 from cellplan.files.schema.path import CsvEntry
 from cellplan.files.schema.robot import RobotEntry
+from cellplan.files.schema.shapes import StepEntry
 from cellplan.files.schema.tool import GripperEntry
 from cellplan.files.yaml.reader import YamlDocument
 from cellplan.geometry.mesh.load import read_drawing
 from cellplan.geometry.shapes import Mesh
+from cellplan.geometry.step.kernel import require_step
+from cellplan.geometry.step.part import StepPart, read_step_part
+from cellplan.geometry.step.reader import UnknownShapeError
 from cellplan.guard import Guard, in_child
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.units import Deg, si_or_none
@@ -35,6 +39,9 @@ if TYPE_CHECKING:  # read only for a cell that names such a file
 Urdfs = dict[Hashable, "UrdfRobot"]  # by what was read of which file
 URDF_SUFFIXES = frozenset({".urdf", XACRO_SUFFIX})
 TABLE_SUFFIXES = frozenset({".yaml", ".yml"})
+STEP_MEGABYTES: Final = 3000  # of which OpenCASCADE alone takes some hundreds
+MOST_PARTS: Final = 8  # parts from STEP files that this process holds
+_PARTS: Final[dict[Hashable, StepPart]] = {}
 
 
 class Sources:
@@ -50,6 +57,7 @@ class Sources:
         self.findings: list[Finding] = []  # about the names in the cell file
         self.errors: list[InputError] = []  # about the files themselves
         self.remarks: list[tuple[str, str]] = []  # key of the cell file, and what was not read of its file
+        self.part: StepPart | None = None  # the part, where it comes from a STEP file
 
     def mesh(
         self, written: str, unit: str | None, path: KeyPath, *, requirement: Callable[[Mesh], None] | None = None
@@ -65,6 +73,21 @@ class Sources:
             self.findings.append(self._document.finding(path, str(error)))
             return None
         return mesh
+
+    def read_part(self, entry: StepEntry) -> None:
+        """Read the part from its STEP file, or find out why that cannot be done."""
+        path: KeyPath = ("part", "step")
+        place = self._file(entry.file, (*path, "file"))
+        if place is None:
+            return
+        try:
+            self.inputs[entry.file] = digest_of_file(place, file=entry.file)
+            self.part = _step_part(place, entry, self.inputs[entry.file])
+            self.remarks.append((key_text(path), self.part.remark))
+        except UnknownShapeError as error:
+            self.findings.append(self._document.finding((*path, "shape"), str(error)))
+        except InputError as error:
+            self.findings.append(self._document.finding((*path, "file"), str(error)))
 
     def targets(self, entry: str | CsvEntry, path: KeyPath) -> SampledPath | TimedPath | None:
         """Tool targets of a task; None after a finding."""
@@ -249,6 +272,19 @@ def _only_for_urdf(name: str, entry: RobotEntry, document: YamlDocument) -> Iter
     for key in ("package_dirs", "xacro_args", "flange", "locked", "srdf", "moveit_limits", "gripper"):
         if getattr(entry, key):
             yield document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
+
+
+def _step_part(place: Path, entry: StepEntry, digest: str) -> StepPart:
+    """The part in a STEP file; one that was read last is not read again."""
+    require_step(entry.file)
+    key = (digest, entry.file, entry.shape, entry.deviation_mm)
+    if key not in _PARTS:
+        guard = Guard(file=entry.file, worker="the STEP reader", megabytes=STEP_MEGABYTES)
+        part = in_child(read_step_part, place, entry.file, entry.shape, entry.deviation_mm.si, guard=guard)
+        while len(_PARTS) >= MOST_PARTS:
+            del _PARTS[next(iter(_PARTS))]
+        _PARTS[key] = part
+    return _PARTS[key]
 
 
 def _read_urdf(known: Urdfs, entry: RobotEntry, place: Path, *, options: "UrdfOptions") -> "UrdfRobot":

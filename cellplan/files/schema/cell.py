@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.files.schema.robot import RobotEntry
-from cellplan.files.schema.shapes import ObstacleEntry, PartShapeEntry
+from cellplan.files.schema.shapes import ObstacleEntry, PartShapeEntry, StepEntry
 from cellplan.files.schema.task import CornerChoice, Seconds, TaskAxis, TaskEntry, TimeLawChoice
 from cellplan.files.schema.tool import Mass
 from cellplan.model.settings.acceleration import AccelerationChoice, CycleTime
@@ -70,7 +70,8 @@ class GraspEntry(Entry):
 class PartEntry(Entry):
     """The workpiece, held by robots or fixed in the world."""
 
-    geometry: PartShapeEntry = Field(description="Shape of the part.")
+    geometry: PartShapeEntry | None = setting(None, "Shape of the part; required without step.")
+    step: StepEntry | None = setting(None, "The part from a STEP file, in place of geometry.")
     held_by: tuple[GraspEntry, ...] = setting(
         (),
         "The robots that hold the part, the one that carries the part frame first; none: fixed in the world.",
@@ -85,6 +86,15 @@ class PartEntry(Entry):
     centre_mm: Coordinates | None = setting(
         None, "Centre of mass in the part frame, for the payload; when absent that of the shape with uniform density."
     )
+
+    @model_validator(mode="after")
+    def _has_one_shape(self) -> Self:
+        """A shape, or a STEP file."""
+        if self.geometry is None and self.step is None:
+            raise rule("missing, expected the shape of the part, or step: with a STEP file", "geometry")
+        if self.geometry is not None and self.step is not None:
+            raise rule("unexpected key, geometry gives the shape already", "step")
+        return self
 
     @model_validator(mode="after")
     def _stands_somewhere(self) -> Self:

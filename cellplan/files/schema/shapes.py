@@ -1,10 +1,11 @@
 """Shapes of parts, tools and surroundings as they are written in a cell file."""
 
-from typing import ClassVar, Final, Literal, Self
+from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
 from cellplan.model.settings.entry import AxisName, Coordinate, Entry, OneOf, PoseEntry, Size, Text, rule, setting
+from cellplan.model.settings.units import Mm, Within
 
 SOLID_SHAPES: Final = ("box", "cylinder", "capsule", "sphere", "mesh")
 
@@ -111,6 +112,20 @@ class PartShapeEntry(OneShape):
     sphere: SphereEntry | None = setting(None, "Ball centred on the part frame.")
     mesh: Text | None = setting(None, f"{MESH_FILE} of a closed surface, drawn in the part frame.")
     unit: MeshUnit | None = setting(None, MESH_UNIT)
+
+
+class StepEntry(Entry):
+    """A part as its STEP file has it; units and places of an assembly are those of the file."""
+
+    file: Text = Field(description="STEP file (.step, .stp); needs the extra `step`. Its frame is the part frame.")
+    shape: Text | None = setting(
+        None, "Name of an assembly, a part or a solid of the file; absent: all solids of the file."
+    )
+    deviation_mm: Annotated[Mm, Within(ge=0.001, le=10.0)] = setting(
+        Mm(0.1),
+        "Largest distance of the mesh from the surfaces of the file. The mesh stands for the part where distances are "
+        "measured and in pictures; its deviation counts as the accuracy of bodies does (`checks.body_accuracy`).",
+    )
 
 
 class ToolShapeEntry(OneShape):

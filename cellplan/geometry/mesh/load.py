@@ -42,6 +42,7 @@ __all__ = [
     "read_drawing",
     "read_mesh",
     "require_enclosing",
+    "require_likely_size",
     "require_solid",
     "tessellate",
     "unknown_format",
@@ -140,7 +141,7 @@ def _checked_mesh(loose: Triangles, name: str, *, scale: Array) -> Mesh:
         vertices = vertices * factors
     is_used = np.zeros(len(vertices), dtype=bool)
     is_used[faces] = True
-    _require_likely_size(vertices[is_used], name)
+    require_likely_size(vertices[is_used], name)
     outward = faces if np.prod(np.sign(factors)) > 0.0 else faces[:, ::-1]
     mesh = make_mesh(vertices, outward, source=name)
     require_few_pieces(mesh.faces, source=name)
@@ -241,7 +242,7 @@ def _read_bytes(path: Path) -> bytes:
         raise InputError(f"{path.name}: the mesh file cannot be read: {reason.lower()}") from None
 
 
-def _require_likely_size(vertices: Array, name: str) -> None:
+def require_likely_size(vertices: Array, name: str) -> None:
     """Refuse meshes that are too small or too large for a robot cell, with a hint at the unit."""
     extent = float(np.ptp(vertices, axis=0).max())
     if not extent <= MAX_EXTENT:

@@ -154,6 +154,7 @@ class Part:
         X_WP: Pose in the world when no robot holds it; None otherwise.
         mass: Mass in [kg]; None when it is not stated.
         centre: Centre of mass in P in [m], shape (3,); None when it is not stated.
+        accuracy: Distance in [m] by which the real part may stick out of the shape: that of a mesh from its drawing.
     """
 
     shape: Solid
@@ -162,6 +163,7 @@ class Part:
     X_WP: Array | None
     mass: float | None = None
     centre: Array | None = None
+    accuracy: float = 0.0
 
     def __post_init__(self) -> None:
         """Check that the place of the part is stated."""

@@ -22,6 +22,7 @@ from cellplan.files.schema.shapes import ObstacleEntry
 from cellplan.files.schema.task import BlendEntry, CornerChoice, TaskEntry, TrapezoidEntry, ViaEntry
 from cellplan.files.schema.tool import OF_ROD, RodEntry, ToolEntry
 from cellplan.files.shapes import MeshReader, centred_solid, direction, obstacle_shape, tool_solid
+from cellplan.geometry.step.part import StepPart
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Grasp, Mode, MotionSettings, Obstacle, Part, Robot, Timing, Tool
 from cellplan.model.cell.rod import Holder, Rod, tool_body_name
@@ -99,10 +100,17 @@ def _order(robot: str, document: CellDocument) -> tuple[str, ...]:
     return tuple(name for name, task in document.tasks.items() if task.robot == robot) if order is None else order
 
 
-def build_part(document: CellDocument, models: Mapping[str, RobotModel], read_mesh: MeshReader) -> Part:
-    """The workpiece, held by robots with their models."""
+def build_part(
+    document: CellDocument, models: Mapping[str, RobotModel], read_mesh: MeshReader, drawn: StepPart | None
+) -> Part:
+    """The workpiece, held by robots with their models; ``drawn`` is what its STEP file has, if it comes from one."""
     entry = document.part
-    shape, X_PS = centred_solid(entry.geometry, read_mesh)
+    if entry.geometry is not None:
+        shape, X_PS = centred_solid(entry.geometry, read_mesh)
+    elif drawn is not None:
+        shape, X_PS = drawn.mesh, np.eye(4)
+    else:
+        raise ValueError("a part without a shape")
     return Part(
         shape=shape,
         X_PS=X_PS,
@@ -119,6 +127,7 @@ def build_part(document: CellDocument, models: Mapping[str, RobotModel], read_me
         X_WP=None if entry.at is None else entry.at.matrix,
         mass=entry.mass_kg,
         centre=None if entry.centre_mm is None else in_si(entry.centre_mm),
+        accuracy=0.0 if drawn is None else drawn.deviation,
     )
 
 

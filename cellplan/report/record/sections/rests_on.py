@@ -43,7 +43,9 @@ class ZeroRecord(TypedDict):
 class RestsOnRecord(TypedDict):
     """Assumptions behind the numbers."""
 
-    bodies: Annotated[dict[str, BodiesRecord], "by robot: accuracy of its link bodies"]
+    bodies: Annotated[
+        dict[str, BodiesRecord], "by robot, and for the part if it comes from a STEP file: accuracy of its bodies"
+    ]
     body_accuracy: Annotated[str, "`report`, or `add`: the accuracy of both bodies is added to the required clearance"]
     payload: Annotated[dict[str, LoadRecord], "by robot: load and rated load"]
     zero: Annotated[dict[str, ZeroRecord], "by robot: the zero that its joint positions count from"]
@@ -75,7 +77,7 @@ def unstated_standoffs(cell: Cell, tips: Sequence[Standoff]) -> list[str]:
 
 
 def bodies_record(cell: Cell) -> dict[str, BodiesRecord]:
-    """Accuracy of the link bodies of each robot and its source; nothing for a robot without bodies."""
+    """Accuracy of the link bodies of each robot and of the part from a STEP file, each with its source."""
     record: dict[str, BodiesRecord] = {}
     for robot in cell.robots:
         stated, bodies = robot.model.body_accuracy, [body for body in robot.model.bodies if body.accuracy is not None]
@@ -85,6 +87,9 @@ def bodies_record(cell: Cell) -> dict[str, BodiesRecord]:
                 "source": "not stated" if stated is None else stated.source,
                 "own_accuracy_mm": {body.name: number(MM * (body.accuracy or 0.0)) for body in bodies},
             }
+    if cell.part.accuracy > 0.0:
+        source = "deviation of its mesh from its STEP file"
+        record["part"] = {"accuracy_mm": number(MM * cell.part.accuracy), "source": source, "own_accuracy_mm": {}}
     return record
 
 
