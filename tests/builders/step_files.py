@@ -82,14 +82,14 @@ def write_step(path: Path, parts: Sequence[Named], *, poses: Sequence[np.ndarray
 
 def distinct(shape: Any, kind: Any) -> list[Any]:
     """Edges or faces of a shape, each once."""
-    found: list[Any] = []
+    shapes: list[Any] = []
     explorer = TopExp_Explorer(shape, kind)
     while explorer.More():
-        if not any(explorer.Current().IsSame(other) for other in found):
-            found.append(explorer.Current())
+        if not any(explorer.Current().IsSame(other) for other in shapes):
+            shapes.append(explorer.Current())
         explorer.Next()
     cast = TopoDS.Edge if kind == TopAbs_EDGE else TopoDS.Face
-    return [cast(it) for it in found]
+    return [cast(it) for it in shapes]
 
 
 def _name(label: Any, name: str) -> None:

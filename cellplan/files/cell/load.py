@@ -36,6 +36,7 @@ from cellplan.files.cell.rules.program_rules import posture_findings, program_fi
 from cellplan.files.cell.rules.rules import Targets, rule_findings, target_findings
 from cellplan.files.cell.rules.solver_rules import solver_findings
 from cellplan.files.cell.rules.task_rules import task_rule_findings
+from cellplan.files.cell.step_parts import read_part
 from cellplan.files.cell.user_folders import user_folders
 from cellplan.files.input.files import AllowedFolders
 from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, key_text, raise_findings, shown
@@ -46,6 +47,7 @@ from cellplan.files.schema.shapes import SolidEntry, ToolShapeEntry
 from cellplan.files.yaml.reader import YamlDocument, read_yaml
 from cellplan.geometry.mesh.load import require_enclosing, require_solid
 from cellplan.geometry.shapes import Mesh
+from cellplan.geometry.step.part import StepPart
 from cellplan.model.cell.cell import Cell
 from cellplan.model.origin import Origin
 from cellplan.model.robot.robot import RobotModel
@@ -195,6 +197,7 @@ def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:
     findings += solver_findings(valid, models, document)
     findings += _part_extent(valid, document)
     _read_meshes(valid, sources)
+    part = read_part(valid, sources)
     layout, wrong = read_layout(valid, sound, document)
     findings += wrong
     targets = _targets(valid, sources)
@@ -202,7 +205,7 @@ def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:
     raise_findings(file, [*findings, *sources.findings], sources.errors)
     if valid.whole is None:
         raise InputError(f"{file}: the cell cannot be understood")
-    cell = _cell(valid.whole, models, targets, source=source, sources=sources)
+    cell = _cell(valid.whole, models, targets, source=source, sources=sources, part=part)
     return _with_source(replace(cell, layout=layout), source)
 
 
@@ -274,8 +277,6 @@ def _read_meshes(valid: ValidEntries, sources: Sources) -> None:
         shapes += [(("robots", name, "mount", "rail", key, index), it) for key, index, it in rail_entries(robot)]
         shapes += [((*place, "geometry"), robot.tool.geometry)] if robot.tool.geometry is not None else []
     part = valid.part.geometry if valid.part is not None else None
-    if valid.part is not None and valid.part.step is not None:
-        sources.read_part(valid.part.step)
     if part is not None and part.mesh is not None:
         sources.mesh(part.mesh, part.unit, ("part", "geometry", "mesh"), requirement=require_solid)
     for path, shape in shapes:
@@ -284,7 +285,13 @@ def _read_meshes(valid: ValidEntries, sources: Sources) -> None:
 
 
 def _cell(
-    whole: CellDocument, models: Mapping[str, RobotModel], targets: Targets, *, source: CellFile, sources: Sources
+    whole: CellDocument,
+    models: Mapping[str, RobotModel],
+    targets: Targets,
+    *,
+    source: CellFile,
+    sources: Sources,
+    part: StepPart | None,
 ) -> Cell:
     """The cell, once there are no findings."""
     document = source.document
@@ -307,7 +314,7 @@ def _cell(
     return Cell(
         name=whole.name,
         robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
-        part=build_part(whole, models, mesh, sources.part),
+        part=build_part(whole, models, mesh, part),
         tasks=tuple(build_task(name, whole, models, targets.__getitem__, origin) for name in whole.tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),
         motion=build_motion(whole.motion),

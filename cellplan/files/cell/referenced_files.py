@@ -5,7 +5,7 @@ import posixpath
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
@@ -18,14 +18,10 @@ from cellplan.files.robots.rules import limits_in_si, tightened
 from cellplan.files.robots.urdf import XACRO_SUFFIX
 from cellplan.files.schema.path import CsvEntry
 from cellplan.files.schema.robot import RobotEntry
-from cellplan.files.schema.shapes import StepEntry
 from cellplan.files.schema.tool import GripperEntry
 from cellplan.files.yaml.reader import YamlDocument
 from cellplan.geometry.mesh.load import read_drawing
 from cellplan.geometry.shapes import Mesh
-from cellplan.geometry.step.kernel import require_step
-from cellplan.geometry.step.part import StepPart, read_step_part
-from cellplan.geometry.step.reader import UnknownShapeError
 from cellplan.guard import Guard, in_child
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.units import Deg, si_or_none
@@ -39,9 +35,6 @@ if TYPE_CHECKING:  # read only for a cell that names such a file
 Urdfs = dict[Hashable, "UrdfRobot"]  # by what was read of which file
 URDF_SUFFIXES = frozenset({".urdf", XACRO_SUFFIX})
 TABLE_SUFFIXES = frozenset({".yaml", ".yml"})
-STEP_MEGABYTES: Final = 3000  # of which OpenCASCADE alone takes some hundreds
-MOST_PARTS: Final = 8  # parts from STEP files that this process holds
-_PARTS: Final[dict[Hashable, StepPart]] = {}
 
 
 class Sources:
@@ -49,7 +42,7 @@ class Sources:
 
     def __init__(self, document: YamlDocument, folders: AllowedFolders, urdfs: Urdfs) -> None:
         """Keep the folders, the document that findings refer to, and robots of URDFs as they were read."""
-        self._document = document
+        self.document = document
         self._folders = folders
         self._meshes: dict[tuple[str, str | None], Mesh | None] = {}
         self._urdfs = urdfs
@@ -57,7 +50,6 @@ class Sources:
         self.findings: list[Finding] = []  # about the names in the cell file
         self.errors: list[InputError] = []  # about the files themselves
         self.remarks: list[tuple[str, str]] = []  # key of the cell file, and what was not read of its file
-        self.part: StepPart | None = None  # the part, where it comes from a STEP file
 
     def mesh(
         self, written: str, unit: str | None, path: KeyPath, *, requirement: Callable[[Mesh], None] | None = None
@@ -70,29 +62,14 @@ class Sources:
             if mesh is not None and requirement is not None:
                 requirement(mesh)
         except InputError as error:
-            self.findings.append(self._document.finding(path, str(error)))
+            self.findings.append(self.document.finding(path, str(error)))
             return None
         return mesh
-
-    def read_part(self, entry: StepEntry) -> None:
-        """Read the part from its STEP file, or find out why that cannot be done."""
-        path: KeyPath = ("part", "step")
-        place = self._file(entry.file, (*path, "file"))
-        if place is None:
-            return
-        try:
-            self.inputs[entry.file] = digest_of_file(place, file=entry.file)
-            self.part = _step_part(place, entry, self.inputs[entry.file])
-            self.remarks.append((key_text(path), self.part.remark))
-        except UnknownShapeError as error:
-            self.findings.append(self._document.finding((*path, "shape"), str(error)))
-        except InputError as error:
-            self.findings.append(self._document.finding((*path, "file"), str(error)))
 
     def targets(self, entry: str | CsvEntry, path: KeyPath) -> SampledPath | TimedPath | None:
         """Tool targets of a task; None after a finding."""
         settings = CsvEntry(file=entry) if isinstance(entry, str) else entry
-        place = self._file(settings.file, path if isinstance(entry, str) else (*path, "file"))
+        place = self.file(settings.file, path if isinstance(entry, str) else (*path, "file"))
         if place is None:
             return None
         try:
@@ -115,10 +92,10 @@ class Sources:
         if suffix in URDF_SUFFIXES:
             model = self._urdf(name, entry)
         else:
-            self.findings += _only_for_urdf(name, entry, self._document)
+            self.findings += _only_for_urdf(name, entry, self.document)
             model = self._table(name, entry, is_file=suffix in TABLE_SUFFIXES)
             if model is not None:
-                model, findings = tightened(("robots", name), entry, model, self._document)
+                model, findings = tightened(("robots", name), entry, model, self.document)
                 self.findings += findings
                 model = None if findings else model
         return model if model is None or entry.controller_zero is None else self._with_zero(name, entry, model)
@@ -127,12 +104,12 @@ class Sources:
         """Note a model that does not exist, of a robot that is invalid for other reasons too."""
         path = ("robots", name, "model")
         if PurePosixPath(written).suffix.lower() in URDF_SUFFIXES | TABLE_SUFFIXES:
-            self._file(written, path)
+            self.file(written, path)
             return
         try:
             load_bundled_table(written)
         except InputError as error:
-            self.findings.append(self._document.finding(path, str(error)))
+            self.findings.append(self.document.finding(path, str(error)))
 
     def srdf(self, name: str, written: str, entry: RobotEntry) -> "Srdf | None":
         """SRDF of a robot, expanded with its packages and arguments; None after a finding."""
@@ -140,7 +117,7 @@ class Sources:
         from cellplan.files.robots.urdf.srdf import read_srdf
 
         path: KeyPath = ("robots", name, "srdf")
-        place, folders = self._file(written, path), self._package_dirs(name, entry)
+        place, folders = self.file(written, path), self._package_dirs(name, entry)
         if place is None or folders is None:
             return None
         arguments = _arguments(entry)
@@ -168,9 +145,9 @@ class Sources:
                 f"unexpected key, the file of '{model.name}' states how its controller counts the joints: "
                 "leave it out, it would be applied twice"
             )
-            self.findings.append(self._document.key_finding(path, text))
+            self.findings.append(self.document.key_finding(path, text))
             return None
-        place = self._file(written, path)
+        place = self.file(written, path)
         if place is None:
             return None
         try:
@@ -182,7 +159,7 @@ class Sources:
 
     def _read_mesh(self, written: str, unit: str | None, path: KeyPath) -> Mesh | None:
         """Mesh in [m]; None after a finding."""
-        place = self._file(written, path)
+        place = self.file(written, path)
         if place is None:
             return None
         try:
@@ -190,16 +167,16 @@ class Sources:
             mesh = in_child(as_here(partial(read_drawing, unit=unit)), place, guard=guard)
             self.inputs[written] = digest_of_file(place, file=written)
         except InputError as error:
-            self.findings.append(self._document.finding(path, str(error)))
+            self.findings.append(self.document.finding(path, str(error)))
             return None
         return mesh
 
-    def _file(self, written: str, path: KeyPath) -> Path | None:
+    def file(self, written: str, path: KeyPath) -> Path | None:
         """Path of a named file; None after a finding."""
         try:
             return self._folders.file(written)
         except InputError as error:
-            self.findings.append(self._document.finding(path, str(error)))
+            self.findings.append(self.document.finding(path, str(error)))
             return None
 
     def _table(self, name: str, entry: RobotEntry, *, is_file: bool) -> RobotModel | None:
@@ -210,11 +187,11 @@ class Sources:
             try:
                 table = load_bundled_table(entry.model)
             except InputError as error:
-                self.findings.append(self._document.finding(path, str(error)))
+                self.findings.append(self.document.finding(path, str(error)))
                 return None
             self.inputs[f"bundled:{entry.model}"] = table.digest
             return table.model
-        place = self._file(entry.model, path)
+        place = self.file(entry.model, path)
         if place is None:
             return None
         try:
@@ -231,13 +208,13 @@ class Sources:
 
     def _urdf(self, name: str, entry: RobotEntry) -> RobotModel | None:
         path, limits = ("robots", name, "model"), entry.moveit_limits
-        place, folders = self._file(entry.model, path), self._package_dirs(name, entry)
-        moveit = None if limits is None else self._file(limits, ("robots", name, "moveit_limits"))
+        place, folders = self.file(entry.model, path), self._package_dirs(name, entry)
+        moveit = None if limits is None else self.file(limits, ("robots", name, "moveit_limits"))
         if place is None or folders is None or (moveit is None and limits is not None):
             return None
         if entry.xacro_args and not (_is_xacro(entry.model) or _is_xacro(entry.srdf)):
             text = f"unexpected key, it applies to a file whose name ends in {XACRO_SUFFIX} only"
-            self.findings.append(self._document.key_finding(("robots", name, "xacro_args"), text))
+            self.findings.append(self.document.key_finding(("robots", name, "xacro_args"), text))
         try:
             options = _urdf_options(entry, folders, moveit, within=self._folders)
             self.inputs |= {} if moveit is None else {limits or "": digest_of_file(moveit, file=str(moveit))}
@@ -247,7 +224,7 @@ class Sources:
             for file in (*robot.included, *robot.mesh_files):
                 if not self._folders.holds(file):
                     text = f"expected files below the folder of the cell file, got {shown(file.name)} from elsewhere"
-                    self.findings.append(self._document.finding(path, f"{text}; allow it with --allow-dir"))
+                    self.findings.append(self.document.finding(path, f"{text}; allow it with --allow-dir"))
                     return None
             self.inputs |= _digests(entry.model, place, (*robot.included, *robot.mesh_files))
         except InputError as error:
@@ -263,7 +240,7 @@ class Sources:
                 folders.append(self._folders.directory(written))
             except InputError as error:
                 path = ("robots", name, "package_dirs", index)
-                self.findings.append(self._document.finding(path, str(error)))
+                self.findings.append(self.document.finding(path, str(error)))
         return tuple(folders) if len(folders) == len(entry.package_dirs) else None
 
 
@@ -272,19 +249,6 @@ def _only_for_urdf(name: str, entry: RobotEntry, document: YamlDocument) -> Iter
     for key in ("package_dirs", "xacro_args", "flange", "locked", "srdf", "moveit_limits", "gripper"):
         if getattr(entry, key):
             yield document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
-
-
-def _step_part(place: Path, entry: StepEntry, digest: str) -> StepPart:
-    """The part in a STEP file; one that was read last is not read again."""
-    require_step(entry.file)
-    key = (digest, entry.file, entry.shape, entry.deviation_mm)
-    if key not in _PARTS:
-        guard = Guard(file=entry.file, worker="the STEP reader", megabytes=STEP_MEGABYTES)
-        part = in_child(read_step_part, place, entry.file, entry.shape, entry.deviation_mm.si, guard=guard)
-        while len(_PARTS) >= MOST_PARTS:
-            del _PARTS[next(iter(_PARTS))]
-        _PARTS[key] = part
-    return _PARTS[key]
 
 
 def _read_urdf(known: Urdfs, entry: RobotEntry, place: Path, *, options: "UrdfOptions") -> "UrdfRobot":

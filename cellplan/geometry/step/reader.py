@@ -116,11 +116,11 @@ def _complete(tool: Any, expected: int, file: str) -> Any:
     from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
     shapes = [XCAFDoc_ShapeTool.GetShape_s(label) for label in _labels(tool.GetShapes) if _is_simple(label)]
-    found = len(
+    count = len(
         {hash(solid.Located(solid.Location().__class__())) for it in shapes for solid in explored(it, TopAbs_SOLID)}
     )
-    if found < expected:
-        raise InputError(f"{file}: expected the {expected} solids that the file states, got {found} that can be built")
+    if count < expected:
+        raise InputError(f"{file}: expected the {expected} solids that the file states, got {count} that can be built")
     return tool
 
 

@@ -101,14 +101,14 @@ def _order(robot: str, document: CellDocument) -> tuple[str, ...]:
 
 
 def build_part(
-    document: CellDocument, models: Mapping[str, RobotModel], read_mesh: MeshReader, drawn: StepPart | None
+    document: CellDocument, models: Mapping[str, RobotModel], read_mesh: MeshReader, step: StepPart | None
 ) -> Part:
-    """The workpiece, held by robots with their models; ``drawn`` is what its STEP file has, if it comes from one."""
+    """The workpiece, held by robots with their models; ``step`` is what its STEP file has, if it comes from one."""
     entry = document.part
     if entry.geometry is not None:
         shape, X_PS = centred_solid(entry.geometry, read_mesh)
-    elif drawn is not None:
-        shape, X_PS = drawn.mesh, np.eye(4)
+    elif step is not None:
+        shape, X_PS = step.mesh, np.eye(4)
     else:
         raise ValueError("a part without a shape")
     return Part(
@@ -127,7 +127,7 @@ def build_part(
         X_WP=None if entry.at is None else entry.at.matrix,
         mass=entry.mass_kg,
         centre=None if entry.centre_mm is None else in_si(entry.centre_mm),
-        accuracy=0.0 if drawn is None else drawn.deviation,
+        accuracy=0.0 if step is None else step.deviation,
     )
 
 
