@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from cellplan.files.cell_errors import load_errors
     from cellplan.jobs.assign.assign import Assignment, assign
     from cellplan.jobs.assign.draft import AssignmentDraft
-    from cellplan.jobs.assign.result import write_assignment
+    from cellplan.jobs.assign.write import write_assignment
     from cellplan.jobs.base_map.base_map import base_map, map_study, write_base_map
     from cellplan.jobs.base_map.grid import BaseGrid
     from cellplan.jobs.base_map.prepared import MapRequest
@@ -95,7 +95,7 @@ _PUBLIC: Final = {  # names by module
     "files.cell_errors": "load_errors",
     "jobs.assign.assign": "Assignment assign",
     "jobs.assign.draft": "AssignmentDraft",
-    "jobs.assign.result": "write_assignment",
+    "jobs.assign.write": "write_assignment",
     "jobs.base_map.base_map": "base_map map_study write_base_map",
     "jobs.base_map.grid": "BaseGrid",
     "jobs.base_map.prepared": "MapRequest",

@@ -11,7 +11,7 @@ import numpy as np
 from cellplan.errors import NoSolutionError
 from cellplan.jobs.assign.assign import Assignment, assign
 from cellplan.jobs.assign.draft import AssignmentDraft
-from cellplan.jobs.assign.result import write_assignment
+from cellplan.jobs.assign.write import write_assignment
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.result_file import BEST
 from cellplan.jobs.layout.search import search_layout

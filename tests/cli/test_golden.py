@@ -19,6 +19,7 @@ pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 GOLDEN = Path(__file__).parent / "golden"
 COMMANDS = (
+    "assign",
     "check",
     "compare",
     "explain",

@@ -3,7 +3,7 @@
 import json
 import re
 import stat
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
@@ -40,20 +40,27 @@ def is_run_folder(path: Path) -> bool:
     return any(_is_its_report(path / name) for name in REPORTS)
 
 
-def foreign_entry(path: Path) -> str | None:
+def foreign_entry(path: Path, *, unlisted: Collection[str] = ()) -> str | None:
     """The first thing in a folder that is not part of a run; None when the folder is empty or a run.
 
     A folder that holds nothing but the rehearsal of its cell is to become a run.
+
+    Args:
+        unlisted: Names of files that may stand there too, with a run or without one.
     """
-    names = sorted(entry.name for entry in path.iterdir())
+    names = sorted(entry.name for entry in path.iterdir() if entry.name not in unlisted)
     if names and not is_run_folder(path) and not (names == [REHEARSAL] and _is_run_entry(path / REHEARSAL)):
         return names[0]
-    return foreign_within(path)
+    return foreign_within(path, unlisted=unlisted)
 
 
-def foreign_within(path: Path) -> str | None:
-    """The first thing at any depth of a run, or of a draft of one, that is not part of it; None when there is none."""
-    return next(_foreign(path, ""), None)
+def foreign_within(path: Path, *, unlisted: Collection[str] = ()) -> str | None:
+    """The first thing at any depth of a run, or of a draft of one, that is not part of it; None when there is none.
+
+    Args:
+        unlisted: Names of files in the folder itself that are taken as part of it.
+    """
+    return next((name for name in _foreign(path, "") if name not in unlisted), None)
 
 
 def _foreign(run: Path, above: str) -> Iterator[str]:

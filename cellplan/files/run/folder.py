@@ -10,6 +10,7 @@ import errno
 import os
 import shutil
 import sys
+from collections.abc import Collection
 from functools import cache
 from pathlib import Path, PurePosixPath
 from types import TracebackType
@@ -54,16 +55,21 @@ class RunFolder:
     everything is removed and an older run stays as it was.
     """
 
-    def __init__(self, path: Path) -> None:
-        """Name the folder; nothing is touched before the ``with`` statement begins."""
+    def __init__(self, path: Path, *, unlisted: Collection[str] = ()) -> None:
+        """Name the folder; nothing is touched before the ``with`` statement begins.
+
+        Args:
+            unlisted: Names of files that may stand in it, and go, although no run lists them.
+        """
         self.path = path  # where the run will stand
+        self._unlisted = unlisted
         self.written: dict[str, tuple[int, str]] = {}  # size in bytes and SHA-256 of every file so far, by name
         self._draft, self._aside = hidden_folders(path)  # sideways is where the older run waits for its end
         self._made_parents: list[Path] = []
 
     def __enter__(self) -> Self:
         """Check the place and open the hidden folder; ``InputError`` where it must not or cannot be written."""
-        refuse_unless_replaceable(self.path)
+        refuse_unless_replaceable(self.path, unlisted=self._unlisted)
         try:
             self._made_parents = _make_parents(self.path.parent)
             self._draft.mkdir()
@@ -118,13 +124,13 @@ class RunFolder:
 
         Where the system cannot do it in one step, the older run is renamed first.
         """
-        refuse_unless_replaceable(self.path)  # again: planning took a while
+        refuse_unless_replaceable(self.path, unlisted=self._unlisted)  # again: planning took a while
         for folder in (self._draft, *(path for path in self._draft.rglob("*") if path.is_dir())):
             _sync_folder(folder)
         if not self.path.exists():
             self._draft.rename(self.path)
         elif exchange(self._draft, self.path):
-            foreign = foreign_within(self._draft)
+            foreign = foreign_within(self._draft, unlisted=self._unlisted)
             if foreign:  # put there meanwhile
                 exchange(self._draft, self.path)
                 raise _holds_foreign(self.path, foreign)
@@ -136,7 +142,7 @@ class RunFolder:
         """Rename the older run, then the new one into its place; undo the first when the second fails."""
         try:
             self.path.rename(self._aside)
-            foreign = foreign_within(self._aside)
+            foreign = foreign_within(self._aside, unlisted=self._unlisted)
             if not foreign:
                 self._draft.rename(self.path)
         finally:
@@ -146,10 +152,13 @@ class RunFolder:
             raise _holds_foreign(self.path, foreign)
 
 
-def refuse_unless_replaceable(path: Path) -> None:
+def refuse_unless_replaceable(path: Path, *, unlisted: Collection[str] = ()) -> None:
     """Refuse links, files, the working folder and folders with other things; call it before any long work.
 
     What processes that were killed left beside it is removed or put back first.
+
+    Args:
+        unlisted: Names of files that may stand in it although no run lists them.
     """
     try:
         for link in (path, path.parent):
@@ -164,7 +173,7 @@ def refuse_unless_replaceable(path: Path) -> None:
         if Path.cwd().resolve().is_relative_to(path.resolve()):
             raise InputError(f"{path}: the output needs a folder of its own, not the one you are working in")
         refuse_unless_writable(path)
-        foreign = foreign_entry(path)
+        foreign = foreign_entry(path, unlisted=unlisted)
     except OSError as error:
         raise _cannot_write(path, error) from error
     if foreign:

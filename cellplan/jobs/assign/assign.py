@@ -9,16 +9,17 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Final
+from typing import Final, TypedDict
 
 from cellplan.errors import ImpossibleTasksError, NoSolutionError
 from cellplan.jobs.assign.draft import AssignmentDraft
-from cellplan.jobs.assign.search import AssignmentSearch
+from cellplan.jobs.assign.search import AssignmentSearch, PlannedBlocks
 from cellplan.jobs.assign.written import written_cell
+from cellplan.model.answers import Answers, worked_out
 from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
-from cellplan.runs.solution import Run, Solution
+from cellplan.runs.solution import Solution
 from cellplan.runs.solve import solve
 from cellplan.search.assign.problem.instance import Instance
 from cellplan.search.assign.schedules.blocks import BlockAnswer
@@ -107,7 +108,12 @@ class AssignmentBound:
 
 
 def assignment_bound(
-    draft: AssignmentDraft, *, effort: int = 2, stations: int | None = None, progress: Progress = silent
+    draft: AssignmentDraft,
+    *,
+    effort: int = 2,
+    stations: int | None = None,
+    progress: Progress = silent,
+    answers: Answers = worked_out,
 ) -> AssignmentBound:
     """The lower bound of a draft, with no program; the arguments are those of ``assign``.
 
@@ -116,14 +122,19 @@ def assignment_bound(
         NoSolutionError: A task can be done by no robot at any pose of the part, or no schedule keeps all rules.
     """
     progress("table of modes", 0.0)
-    search = AssignmentSearch(draft, effort, most_stations=stations)
+    search = AssignmentSearch(draft, effort, most_stations=stations, answers=answers)
     instance = search.instance(progress)
     progress("blocks", 0.0)
     return AssignmentBound(draft=draft.cell, instance=instance, answer=search.blocks(instance), counts=search.counts)
 
 
 def assign(
-    draft: AssignmentDraft, *, effort: int = 2, stations: int | None = None, progress: Progress = silent
+    draft: AssignmentDraft,
+    *,
+    effort: int = 2,
+    stations: int | None = None,
+    progress: Progress = silent,
+    answers: Answers = worked_out,
 ) -> Assignment:
     """Choose robots, order, directions, spins and poses of the part for all tasks.
 
@@ -135,6 +146,7 @@ def assign(
         effort: Work of the block model, from 1 to 5.
         stations: Number of poses of the part in use at most; that of the draft when None.
         progress: Called with the stage and the fraction done.
+        answers: What answers for clearances, transfers and programs, or records it.
 
     Raises:
         InputError: Something in the cell cannot be assigned.
@@ -143,7 +155,7 @@ def assign(
 
     def searched(given: AssignmentDraft) -> AssignmentSearch:
         progress("table of modes", 0.0)
-        return AssignmentSearch(given, effort, most_stations=stations)
+        return AssignmentSearch(given, effort, most_stations=stations, answers=answers)
 
     left_out: tuple[str, ...] = ()
     try:
@@ -171,34 +183,34 @@ def _program_of(search: AssignmentSearch, progress: Progress) -> Assignment:
     """The program of all tasks of a draft."""
     draft = search.draft
     instance = search.instance(progress)
-    counts = search.counts
+    counts, plans = search.counts, list[PlannedBlocks]()
     for number in range(1, ROUNDS + 1):
         progress("blocks", (number - 1) / ROUNDS)
-        planned = search.planned(instance, is_first=number == 1)
-        cell = written_cell(draft, instance, planned.sequenced)
-        solution = _solved(cell, progress)
-        if number == 1:
-            steps = None if has_open_rests(draft.cell, instance) else planned.bound
-            bound = None if steps is None else steps * instance.step
-            is_proved, others, without = planned.is_proved, planned.others, planned.without
-        if not isinstance(solution, str) and (solution.passed or number == ROUNDS):
-            return Assignment(
-                draft=draft.cell,
-                cell=cell,
-                solution=solution,
-                instance=instance,
-                sequenced=planned.sequenced,
-                bound=bound,
-                is_proved=is_proved,
-                greedy=planned.greedy * instance.step,
-                alternatives=alternatives_to(planned.sequenced, others),
-                without={name: None if it is None else it.steps * instance.step for name, it in without.items()},
-                rounds=number,
-                counts=counts | {"certificates": planned.examined, "refused": planned.refused},
-            )
-        instance = without_failed(instance, planned.sequenced, solution)
-    raise NoSolutionError(
-        f"{draft.cell.origin.at('tasks')}: no program passed in {ROUNDS} rounds; the last one: {solution}"
+        plans.append(search.planned(instance, is_first=number == 1))
+        cell = written_cell(draft, instance, plans[-1].sequenced)
+        solution, failure = _tried(cell, search.answers, progress)
+        if failure is None or number == ROUNDS:
+            break
+        instance = without_failed(instance, plans[-1].sequenced, failure)
+    if failure is not None and failure["reason"]:
+        where = draft.cell.origin.at("tasks")
+        raise NoSolutionError(f"{where}: no program passed in {ROUNDS} rounds; the last one: {failure['reason']}")
+    first, planned = plans[0], plans[-1]
+    steps = None if has_open_rests(draft.cell, instance) else first.bound
+    without = {name: None if it is None else it.steps * instance.step for name, it in first.without.items()}
+    return Assignment(
+        draft=draft.cell,
+        cell=cell,
+        solution=solution or solve(cell, progress=progress),
+        instance=instance,
+        sequenced=planned.sequenced,
+        bound=None if steps is None else steps * instance.step,
+        is_proved=first.is_proved,
+        greedy=planned.greedy * instance.step,
+        alternatives=alternatives_to(planned.sequenced, first.others),
+        without=without,
+        rounds=len(plans),
+        counts=counts | {"certificates": planned.examined, "refused": planned.refused},
     )
 
 
@@ -216,27 +228,50 @@ def alternatives_to(best: SequencedBlocks, others: Iterable[SequencedBlocks]) ->
     return tuple(different.values())[1 : 1 + MOST_OTHERS]
 
 
-def _solved(cell: Cell, progress: Progress) -> Solution | str:
-    """The program, solved and verified; why there is none."""
-    try:
-        return solve(cell, progress=progress)
-    except NoSolutionError as error:
-        return str(error)
+class Failure(TypedDict):
+    """Why a program did not pass, as plain data."""
+
+    reason: str  # why there is none; empty where there is one
+    blocks: list[int]  # places of the blocks that failed a check
+    short_s: float  # longest time by which the part cooled too shortly
 
 
-def without_failed(instance: Instance, sequenced: SequencedBlocks, solution: Solution | str) -> Instance:
+def _tried(cell: Cell, answers: Answers, progress: Progress) -> tuple[Solution | None, Failure | None]:
+    """A program, solved and verified, and why it did not pass; no solution where that was recorded."""
+    solutions = list[Solution]()
+
+    def solved() -> Failure | None:
+        try:
+            solutions.append(solve(cell, progress=progress))
+        except NoSolutionError as error:
+            return Failure(reason=str(error), blocks=[], short_s=0.0)
+        return failure_of(solutions[0])
+
+    failure: Failure | None = answers("program", str(cell.origin.document), solved)
+    return next(iter(solutions), None), failure
+
+
+def failure_of(solution: Solution) -> Failure | None:
+    """Why a program did not pass; None where it did."""
+    if solution.passed:
+        return None
+    checks = [check for run in solution.runs for check in run.report.checks if not check.passed]
+    works = [run for run in solution.runs if run.schedule.tasks]
+    return Failure(
+        reason="",
+        blocks=[place for place, run in enumerate(works) if not all(check.passed for check in run.report.checks)],
+        short_s=max((check.limit - check.value for check in checks if check.name == "rest"), default=0.0),
+    )
+
+
+def without_failed(instance: Instance, sequenced: SequencedBlocks, failure: Failure) -> Instance:
     """The instance without the choices of blocks that failed; where the part cooled too shortly, with longer rests."""
-    checks = () if isinstance(solution, str) else [check for run in solution.runs for check in run.report.checks]
-    if (rules := instance.rules.with_longer_rests(checks, instance.step)) != instance.rules:
+    if (rules := instance.rules.with_longer_rests(failure["short_s"], instance.step)) != instance.rules:
         return replace(instance, rules=rules)
     blocks = sequenced.schedule.blocks
-    failed = set(range(len(blocks)))
-    if isinstance(solution, str):
-        words = set(re.findall(r"[\w-]+", solution))
-        failed = {place for place, block in enumerate(blocks) if words.intersection(block)} or failed
-    else:
-        works = [run for run in solution.runs if run.schedule.tasks]
-        failed = {place for place, run in enumerate(works) if not _passed(run)} or failed
+    words = set(re.findall(r"[\w-]+", failure["reason"]))
+    named = {place for place, block in enumerate(blocks) if words.intersection(block)}
+    failed = {*failure["blocks"], *named} or set(range(len(blocks)))
     modes, conflicts = dict(instance.modes), set(instance.conflicts)
     for place in failed:
         chosen = {
@@ -256,7 +291,3 @@ def without_failed(instance: Instance, sequenced: SequencedBlocks, solution: Sol
             elif any(key[0] == keys[0][0] for key in modes if key != keys[0]):
                 del modes[keys[0]]
     return replace(instance, conflicts=frozenset(conflicts)).with_modes(modes)
-
-
-def _passed(run: Run) -> bool:
-    return all(check.passed for check in run.report.checks)

@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from cellplan.checks.verify import completed, verify_motion
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.files.run.joint_tables import parse_table
-from cellplan.geometry.arrays import Array
 from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.jobs.assign.written import task_values
+from cellplan.model.answers import Answers
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress
 from cellplan.planning.sequence.arrangement import with_tasks
@@ -26,14 +28,17 @@ from cellplan.search.assign.problem.moving_blocks import Candidate, Column, Movi
 MOST_PLANNED: Final = 40  # candidates
 MOST_ALIKE: Final = 2  # columns of the same tasks by the same robots
 
+Configurations = dict[str, list[list[float]]]  # of robots, in the order of time, by name
+
 
 def verified_columns(
-    draft: AssignmentDraft, goals: Sequence[TaskGoal], scene: Scene, progress: Progress
+    draft: AssignmentDraft, goals: Sequence[TaskGoal], scene: Scene, progress: Progress, answers: Answers
 ) -> list[Column]:
     """Columns of one draft: first those of tasks that have fewest so far, of many tasks at once.
 
     Args:
         scene: The scene of its cell.
+        answers: What plans candidates, or records how they were planned.
     """
     cell = draft.cell
     search = MovingBlockSearch(
@@ -55,42 +60,48 @@ def verified_columns(
         progress("blocks with a moving part", number / MOST_PLANNED)
         candidate = min(left, key=lambda it: (sum(of_task[option.mode.task] for option in it) / len(it), -len(it)))
         tried.add(_how(candidate))
-        column = None if search.meet(candidate) else verified_column(cell, search.stations, candidate)
-        if column is not None:
-            columns.append(column)
+        planned = None if search.meet(candidate) else _planned(cell, search.stations, candidate, answers)
+        if planned is not None:
+            columns.append(_column(candidate, planned, search.stations))
             alike[_who(candidate)] += 1
             of_task.update(option.mode.task for option in candidate)
     return columns
 
 
-def verified_column(cell: Cell, stations: Stations, candidate: Candidate) -> Column | None:
-    """A candidate as its block is planned; None where that cannot be, or fails a check."""
+def _planned(cell: Cell, stations: Stations, candidate: Candidate, answers: Answers) -> Configurations | None:
+    """Configurations of a candidate as its block is planned; None where that cannot be, or fails a check."""
     place, holder = candidate[0].mode.station, str(stations.holder)
     values: dict[str, object] = {}
     for option in candidate:
         end = End(mode=option.mode, is_reversed=option.is_reversed)
         values |= task_values(cell, end, (), (holder, stations.q[place]))
         values |= {f"tasks.{option.mode.task}.holder_moves": True}
-    names = [option.mode.task for option in candidate]
-    try:
-        work = plan_work(with_tasks(cell.with_values(values), names))
-    except (InputError, NoSolutionError):
-        return None
-    stage, q = work.stages[0], work.stages[0].motion.q
-    if not _passes(work.cell, stage):
-        return None
-    moved = q[:, cell.columns(holder)]
-    rows = spread_rows(len(q), len(candidate[0].q))
 
-    def resolved(name: str, *, is_reversed: bool) -> Array:
-        in_time: Array = q[rows][:, cell.columns(name)]
-        return in_time[::-1] if is_reversed else in_time
+    def planned() -> Configurations | None:
+        try:
+            work = plan_work(with_tasks(cell.with_values(values), [option.mode.task for option in candidate]))
+        except (InputError, NoSolutionError):
+            return None
+        if not _passes(work.cell, work.stages[0]):
+            return None
+        q = work.stages[0].motion.q
+        rows = spread_rows(len(q), len(candidate[0].q))
+        names = [holder, *(option.mode.robot for option in candidate)]
+        return {name: q[rows][:, cell.columns(name)].tolist() for name in names}
 
+    answer: Configurations | None = answers("block with a moving part", str(values), planned)
+    return answer
+
+
+def _column(candidate: Candidate, planned: Configurations, stations: Stations) -> Column:
+    """A candidate with the configurations of its block, as they were planned."""
+    moved = np.array(planned[str(stations.holder)])
+    in_time = {option.mode.robot: np.array(planned[option.mode.robot]) for option in candidate}
     return Column(
-        modes=tuple(replace(it.mode, q=resolved(it.mode.robot, is_reversed=it.is_reversed)) for it in candidate),
+        modes=tuple(replace(it.mode, q=in_time[it.mode.robot][:: -1 if it.is_reversed else 1]) for it in candidate),
         begin=moved[0],
         end=moved[-1],
-        X_WP=stations.X_WP[place],
+        X_WP=stations.X_WP[candidate[0].mode.station],
     )
 
 

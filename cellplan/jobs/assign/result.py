@@ -1,29 +1,22 @@
 """An assignment as record, text and page: what is shown, and in which order."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, Final
 
-from cellplan.files.cell.load import CellFile, load_cell
-from cellplan.files.run.folder import RunFolder
 from cellplan.jobs.assign.assign import Assignment, AssignmentBound, has_open_rests
-from cellplan.jobs.layout.result_file import BEST, result_files
 from cellplan.model.cell.cell import Cell
-from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import CAUTION
 from cellplan.report.page.figures import figure
 from cellplan.report.page.kind import ResultKind
 from cellplan.report.page.render import template
 from cellplan.report.page.time_line import time_line
 from cellplan.report.plots.palette import robot_colours
-from cellplan.report.record.common import Record, as_json, number
+from cellplan.report.record.common import Record, number
 from cellplan.report.record.rows import Tables, columns_of, flat
 from cellplan.report.text.method import counted
-from cellplan.runs.solution import Run, Solution
-from cellplan.runs.solve import with_verdict
-from cellplan.runs.write_run import versions, write_run
+from cellplan.runs.solution import Run
+from cellplan.runs.write_run import versions
 from cellplan.search.assign.problem.instance import Instance
 from cellplan.search.assign.schedules.order import SequencedBlocks
 from cellplan.search.assign.schedules.solver import solver_version
@@ -108,16 +101,6 @@ def bound_lines(record: Record) -> list[str]:
         f"{record['cell']}: lower bound {record['bound_s']:g} s, of {record['bound_holds_for']}",
         f"  {len(record['blocks'])} blocks at {record['counts']['stations']} poses; {proved}; no program was made",
     ]
-
-
-def write_bound(record: Record, folder: Path) -> None:
-    """Write the record of a bound into a folder, which appears whole or not at all.
-
-    Raises:
-        InputError: The folder cannot be written, or holds something that cellplan did not write.
-    """
-    with RunFolder(folder) as target:
-        target.write_text("assign.json", as_json(record))
 
 
 def _only_one_robot(instance: Instance) -> dict[str, str]:
@@ -317,7 +300,7 @@ def _bound_figure(record: Record) -> list[dict[str, Any]]:
     return [figure("lower bound", f"{record['bound_s']:g}", "s", note=record["bound_holds_for"])]
 
 
-# Tables and files
+# Tables
 
 
 def assign_tables(record: Record) -> Tables:
@@ -329,60 +312,6 @@ def assign_tables(record: Record) -> Tables:
     ]
     robots = [{"robot": name, **use} for name, use in record["robots"].items()]
     return {"tasks": lambda: columns_of(map(flat, tasks), []), "robots": lambda: columns_of(map(flat, robots), [])}
-
-
-def write_assignment(assignment: Assignment, given: Path, folder: Path, *, progress: Progress = silent) -> Record:
-    """Write an assignment into a folder, which appears whole or not at all.
-
-    It holds ``assign.json``, ``assign.html``, ``best.yaml`` with the files that it names, and its run.
-
-    Args:
-        assignment: As ``assign`` returns it.
-        given: The cell file that it was made from.
-        folder: The folder; an earlier one is replaced.
-        progress: Called with the stage and the fraction done.
-
-    Returns:
-        The record in ``assign.json``.
-
-    Raises:
-        InputError: The folder cannot be written, or holds something that cellplan did not write.
-    """
-    record, source = assign_record(assignment), assignment.cell.origin.source
-    allowed = (given.parent, *(source.allow_dirs if isinstance(source, CellFile) else ()))
-    head = f"Assigned by cellplan assign: {record['cycle_time_s']:g} s from home to home."
-    if assignment.left_out:
-        head += f" PARTIAL: {len(assignment.left_out)} tasks that no robot can do, and all after them, are left out."
-    with RunFolder(folder) as target:
-        files = result_files(assignment.cell, given, folder, head=head)
-        for name, content in files.items():
-            target.write_bytes(name, content)
-        best = load_cell(target.within(BEST), allow_dirs=allowed)
-        solution = read_from(assignment.solution, best, folder / BEST)
-        run = write_run(solution, target.within("run"), progress=progress)
-        target.write_text("assign.html", assign_page(record, run, solution.cell))
-        record["files"] = {name: sha256 for name, (_, sha256) in target.written.items()}
-        target.write_text("assign.json", as_json(record))
-    return record
-
-
-def read_from(solution: Solution, cell: Cell, file: Path) -> Solution:
-    """A solution as that of a cell file which says the same in place of the one that it was changed from.
-
-    Args:
-        cell: The cell of the file.
-        file: Where the file will stand.
-    """
-    origin = replace(cell.origin, file=str(file))
-
-    def renamed(whole: Cell) -> Cell:
-        return replace(whole, origin=origin, inputs=cell.inputs)
-
-    solved, runs = renamed(solution.cell), solution.runs
-    program = with_verdict(solved, solution.program, [run.phase for run in runs], [run.report for run in runs])
-    scenes = [replace(run.scene, cell=renamed(run.cell)) for run in runs]
-    named = (replace(run, scene=scene, program=program) for run, scene in zip(runs, scenes, strict=True))
-    return replace(solution, cell=solved, runs=tuple(named))
 
 
 ASSIGNMENT: Final = ResultKind(

@@ -10,13 +10,14 @@ from cellplan.jobs.assign.columns import verified_columns
 from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.jobs.assign.planned_ends import planned_ends
 from cellplan.jobs.assign.written import goals_written_otherwise, written_points
+from cellplan.model.answers import Answers, worked_out
 from cellplan.model.cell.cell import Timing
 from cellplan.model.progress import Progress
 from cellplan.runs.plan.retiming import joint_bounds, transfer_retimer
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.problem.clearance import AssignmentClearance
 from cellplan.search.assign.problem.durations import with_stand_offs
-from cellplan.search.assign.problem.goals import TaskGoal, task_goals
+from cellplan.search.assign.problem.goals import Stations, TaskGoal, task_goals
 from cellplan.search.assign.problem.instance import Instance, find_conflicts, least_transfer, with_rules
 from cellplan.search.assign.problem.moving_blocks import joint_angles, with_columns
 from cellplan.search.assign.problem.rules import TaskRules, tasks_before
@@ -60,9 +61,20 @@ class PlannedBlocks:
 class AssignmentSearch:
     """The search of one draft."""
 
-    def __init__(self, draft: AssignmentDraft, effort: int, *, most_stations: int | None = None) -> None:
-        """Begin with nothing chosen; most_stations counts instead of that of the draft."""
-        self.draft, self._effort = draft, EFFORT[effort - 1]
+    def __init__(
+        self,
+        draft: AssignmentDraft,
+        effort: int,
+        *,
+        most_stations: int | None = None,
+        answers: Answers = worked_out,
+    ) -> None:
+        """Begin with nothing chosen; most_stations counts instead of that of the draft.
+
+        Args:
+            answers: What answers for what takes long, or records it.
+        """
+        self.draft, self.answers, self._effort = draft, answers, EFFORT[effort - 1]
         self._most_stations = most_stations or draft.settings.most_stations
         self._scene = Scene.from_cell(draft.cell)
         self._refusals: list[Refusal] = []  # of transfers, once for all schedules
@@ -77,9 +89,7 @@ class AssignmentSearch:
         draft, settings = self.draft, self.draft.settings
         cell, stations = draft.cell, draft.stations()
         goals = [self._as_given(goal) for goal in task_goals(cell, draft.robots)]
-        clearance = AssignmentClearance(
-            scene=self._scene, home=draft.home, stations=stations, conflict=settings.conflict_mm.si
-        )
+        clearance = self._clearance_at(stations)
         directed, fits = [*goals, *goals_written_otherwise(draft, goals)], clearance.tool_fits
         search = ModeSearch(cell=cell, goals=directed, stations=stations, spins=draft.spins(), tool_fits=fits)
         table = search.table()
@@ -87,7 +97,7 @@ class AssignmentSearch:
         progress("stations", 0.0)
         rules = TaskRules.of(cell)
         used, modes = choose_stations(table, goals, clearance, most=self._most_stations, rules=rules)
-        columns = verified_columns(draft, goals, self._scene, progress) if settings.groups else []
+        columns = verified_columns(draft, goals, self._scene, progress, self.answers) if settings.groups else []
         able = {it.task for column in columns for it in column.modes} | {task for task, _, _ in modes}
         refuse_impossible_tasks(draft, goals, table, able)
         progress("conflicts", 0.0)
@@ -114,10 +124,21 @@ class AssignmentSearch:
         } | ({"moving_blocks": len(columns)} if settings.groups else {})
         return instance
 
+    def _clearance_at(self, stations: Stations) -> AssignmentClearance:
+        """What answers for collisions at some stations."""
+        return AssignmentClearance(
+            scene=self._scene,
+            home=self.draft.home,
+            stations=stations,
+            conflict=self.draft.settings.conflict_mm.si,
+            answers=self.answers,
+        )
+
     def _refined_by(self, search: ModeSearch, clearance: AssignmentClearance) -> Refinement:
         """What refines the modes of a search: certified transfers, and where tools with a free spin end."""
-        certifier = TransferCertifier(scene=self._scene, home=self.draft.home, retimer=transfer_retimer(self._scene))
-        ends = partial(planned_ends, self.draft)
+        retimer = transfer_retimer(self._scene)
+        certifier = TransferCertifier(scene=self._scene, home=self.draft.home, retimer=retimer, answers=self.answers)
+        ends = partial(planned_ends, self.draft, self.answers)
         return Refinement(search=search, clearance=clearance, certifier=certifier, planned_ends=ends)
 
     def planned(self, instance: Instance, *, is_first: bool) -> PlannedBlocks:

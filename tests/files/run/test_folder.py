@@ -300,7 +300,7 @@ def test_notes_anywhere_in_a_run_are_not_lost(
 
     if not exchanges:
         monkeypatch.setattr(run_folder, "exchange", lambda *_: False)
-    monkeypatch.setattr(run_folder, "refuse_unless_replaceable", lambda _: None)  # it came after the question
+    monkeypatch.setattr(run_folder, "refuse_unless_replaceable", lambda _, **__: None)  # it came after the question
     with pytest.raises(InputError, match="which cellplan did not write"):
         write_run(tmp_path / "bench")
 

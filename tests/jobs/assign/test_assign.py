@@ -10,7 +10,8 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.files.cell.load import load_cell, load_open_cell
 from cellplan.jobs.assign.assign import Assignment, assign
 from cellplan.jobs.assign.draft import AssignmentDraft
-from cellplan.jobs.assign.result import assign_lines, assign_record, write_assignment
+from cellplan.jobs.assign.result import assign_lines, assign_record
+from cellplan.jobs.assign.write import write_assignment
 from cellplan.runs.solve import solve
 from cellplan.runs.write_run import write_run
 from cellplan.search.assign.schedules.schedule import refuse_impossible

@@ -11,7 +11,8 @@ from cellplan.files.cell.load import load_cell
 from cellplan.jobs.assign.assign import Assignment, assign
 from cellplan.jobs.assign.columns import verified_columns
 from cellplan.jobs.assign.draft import AssignmentDraft
-from cellplan.jobs.assign.result import assign_record, write_assignment
+from cellplan.jobs.assign.result import assign_record
+from cellplan.jobs.assign.write import write_assignment
 from cellplan.model.progress import silent
 from cellplan.runs.solve import solve
 from cellplan.runs.write_run import write_run

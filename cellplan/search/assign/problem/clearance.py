@@ -14,6 +14,7 @@ import numpy as np
 
 from cellplan.certify.run_pairs import rows_moved_by, scene_of_rows
 from cellplan.geometry.arrays import Array, Indices
+from cellplan.model.answers import Answers, worked_out
 from cellplan.scene.bodies import Kind
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -97,6 +98,7 @@ class AssignmentClearance:
         scene: The scene of the cell, with all tools at work.
         home: Stacked homes of all robots in [rad] or [m], shape (nq,).
         conflict: Distance in [m] that two robots at work are to keep.
+        answers: What answers for many modes at once, or records it.
         examined: Numbers of modes, and of pairs of modes, that were examined.
     """
 
@@ -104,6 +106,7 @@ class AssignmentClearance:
     home: Array
     stations: Stations
     conflict: float
+    answers: Answers = worked_out
     examined: tuple[int, int] = (0, 0)
     _fitting: dict[tuple[object, ...], bool] = field(default_factory=dict)
 

@@ -201,9 +201,17 @@ def find_conflicts(modes: Mapping[Key, Sequence[TaskMode]], clearance: Assignmen
     at_station: dict[int, list[Key]] = {}
     for key in modes:
         at_station.setdefault(key[2], []).append(key)
-    return frozenset(
-        frozenset((first, second))
-        for keys in at_station.values()
-        for first, second in combinations(keys, 2)
-        if first[0] != second[0] and first[1] != second[1] and clearance.meet(modes[first][0], modes[second][0])
+    return frozenset(it for keys in at_station.values() for it in _conflicts_of(keys, modes, clearance))
+
+
+def _conflicts_of(
+    keys: Sequence[Key], modes: Mapping[Key, Sequence[TaskMode]], clearance: AssignmentClearance
+) -> list[Conflict]:
+    """Likewise, of the tasks at one station."""
+    pairs = [(a, b) for a, b in combinations(keys, 2) if a[0] != b[0] and a[1] != b[1]]
+    places = clearance.answers(
+        "conflicts",
+        str(pairs),
+        lambda: [place for place, (a, b) in enumerate(pairs) if clearance.meet(modes[a][0], modes[b][0])],
     )
+    return [frozenset(pairs[place]) for place in places]

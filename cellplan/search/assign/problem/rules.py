@@ -1,6 +1,6 @@
 """Rules of a program between its tasks, as an assignment keeps them."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations, permutations, product
 from typing import Final, Self
@@ -10,7 +10,6 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.measures.weld_position import POINTS, resting_pairs
 from cellplan.model.cell.cell import Cell
-from cellplan.model.report.report import Check
 from cellplan.model.settings.program import groups_of
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths
@@ -55,9 +54,8 @@ class TaskRules:
             where=cell.origin.at("program"),
         )
 
-    def with_longer_rests(self, checks: Iterable[Check], step: float) -> Self:
-        """The rules with rests that are longer by what those of a program fell short of, by its checks; step in [s]."""
-        short = max((it.limit - it.value for it in checks if it.name == "rest" and not it.passed), default=0.0)
+    def with_longer_rests(self, short: float, step: float) -> Self:
+        """The rules with rests that are longer by a time, in [s], in whole steps, in [s]."""
         return replace(self, lags={pair: lag + steps_over(short, step) for pair, lag in self.lags.items()})
 
     def is_crowded(self, tasks: tuple[str, str], are_reversed: tuple[bool, bool]) -> bool:

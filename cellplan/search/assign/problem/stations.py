@@ -1,6 +1,7 @@
 """Stations: the few poses of the part that are in use, by greedy cover, with the modes that are free of collisions."""
 
 from collections.abc import Collection, Sequence
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -57,7 +58,9 @@ class _Cover:
         self._keys: dict[int, list[Key]] = {}
         for key in table.modes:
             self._keys.setdefault(key[2], []).append(key)
-        self._left = [station for station in sorted(self._keys) if clearance.is_open(station)]
+        stations = sorted(self._keys)
+        is_open = clearance.answers("open stations", str(stations), lambda: [*map(clearance.is_open, stations)])
+        self._left = [station for station, it in zip(stations, is_open, strict=True) if it]
         self._robots = sorted({robot for _, robot, _ in table.modes})
         options = [sum(key[0] == goal.name for key in table.modes) for goal in goals]
         order = sorted(range(len(goals)), key=lambda place: (options[place], -goals[place].steps, place))
@@ -140,9 +143,15 @@ class _Cover:
 
     def _free(self, keys: Sequence[Key]) -> FreeModes:
         """The first modes of each task and robot that are free of collisions."""
-        free = FreeModes()
-        for key in keys:
-            for mode in self._table.modes[key]:
-                if len(free.get(key, ())) < MOST_FREE and self._clearance.is_free(mode):
-                    free[key] = (*free.get(key, ()), mode)
-        return free
+        modes = [self._table.modes[key] for key in keys]
+
+        def examined() -> list[list[int]]:
+            free = ((place for place, it in enumerate(one) if self._clearance.is_free(it)) for one in modes)
+            return [list(islice(places, MOST_FREE)) for places in free]
+
+        answer = self._clearance.answers("free modes", str(keys), examined)
+        return {
+            key: tuple(one[place] for place in places)
+            for key, one, places in zip(keys, modes, answer, strict=True)
+            if places
+        }

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import chain, combinations, pairwise, product
 from typing import Final
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.geometry.arrays import Array
+from cellplan.model.answers import Answers, worked_out
 from cellplan.planning.timing.retime import Retimer
 from cellplan.planning.transfer.in_legs import least_steps, legs_of
 from cellplan.planning.transfer.query import TransferQuery
@@ -32,12 +34,14 @@ class TransferCertifier:
         scene: The scene of the cell.
         home: Stacked homes of all robots in [rad] or [m], shape (nq,).
         retimer: The limits of all joints and the step of the rows.
+        answers: What answers for a transfer, or records it.
         examined: Number of transfers that were certified.
     """
 
     scene: Scene
     home: Array
     retimer: Retimer
+    answers: Answers = worked_out
     examined: int = 0
     _known: dict[bytes, Refusal | None] = field(default_factory=dict)
     _timed: set[bytes] = field(default_factory=set)  # those of which the legs are known
@@ -109,8 +113,7 @@ class TransferCertifier:
         for query, _, key in self._transfers(sequencer, sequenced):
             if (refusal := self._known[key]) is not None and key not in self._timed:
                 self._timed.add(key)
-                legs = legs_of(query, self.retimer, Tried(), self._moves)
-                steps = self._steps_of(legs) if legs else self._one_by_one(query)
+                steps = self.answers("legs", key.hex(), partial(self._steps_in_legs, query))
                 self._known[key] = timed = replace(refusal, steps=max(steps, refusal.steps))
                 refusals += [timed] if steps > refusal.steps else []
         return refusals
@@ -139,8 +142,12 @@ class TransferCertifier:
         """The refusal of a transfer; None where it is free straight."""
         start, goal = query.start, query.goal
         self.examined += 1
-        carriers = self._moves.refusing(start, goal, query.movers)
-        if carriers is None:
+
+        def refusing() -> list[str]:
+            return sorted(self._moves.refusing(start, goal, query.movers) or ())
+
+        carriers = self.answers("transfer", start.tobytes().hex() + goal.tobytes().hex(), refusing)
+        if not carriers:
             return None
         columns = {name: self.scene.cell.columns(name) for name in query.movers if name in carriers}
         ends = {name: (start[at].tobytes(), goal[at].tobytes()) for name, at in columns.items()}
@@ -157,9 +164,11 @@ class TransferCertifier:
         at = np.array(ends)
         return int(straight_steps(at[:-1], at[1:], self.retimer.bounds, self.retimer.step).sum())
 
-    def _one_by_one(self, query: TransferQuery) -> int:
-        """Steps of all robots straight, one after the other."""
-        return self._steps_of([query.standing(query.movers[:count]) for count in range(len(query.movers) + 1)])
+    def _steps_in_legs(self, query: TransferQuery) -> int:
+        """Steps of straight legs in which all robots get there; where there are none, of one after the other."""
+        legs = legs_of(query, self.retimer, Tried(), self._moves)
+        movers = query.movers
+        return self._steps_of(legs or [query.standing(movers[:count]) for count in range(len(movers) + 1)])
 
     def _stacked(self, sequencer: Sequencer, stop: Stop, *, leaves: bool) -> Array:
         """Stacked configuration in which all robots leave a stop, or come to it, shape (nq,)."""
