@@ -6,8 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cellplan.files.schema import errors_schema, json_schema, robot_table_schema
-from cellplan.files.schema.json_schemas import entry_title
+from cellplan.files.schema.json_schemas import entry_title, errors_schema, json_schema, robot_table_schema
 from cellplan.jobs.layout.record import layout_schema
 from cellplan.jobs.repair.record import advice_schema
 from cellplan.report.record.figures import QUANTITIES

@@ -18,7 +18,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache, partial
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
@@ -202,6 +201,8 @@ def _remove_oldest(folder: Path) -> None:
 @cache
 def _code() -> bytes | None:
     """Digest of the code that makes what is kept, and of the versions it rests on; None when it cannot be read."""
+    from importlib.metadata import PackageNotFoundError, version  # slow, and proofs do without the cache
+
     total = hashlib.sha256(f"{platform.system()} {platform.machine()}".encode())
     root = Path(__file__).resolve().parent.parent
     try:

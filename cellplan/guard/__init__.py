@@ -4,8 +4,8 @@ Work of our own is done beside this process by copies of it.
 """
 
 from cellplan.guard.forked import ForkedWork, processors
-from cellplan.guard.isolated_call import in_child
+from cellplan.guard.isolated_call import begin_child, in_child
 from cellplan.guard.stock import ChildStock
 from cellplan.guard.worker_process import Guard
 
-__all__ = ["ChildStock", "ForkedWork", "Guard", "in_child", "processors"]
+__all__ = ["ChildStock", "ForkedWork", "Guard", "begin_child", "in_child", "processors"]

@@ -8,10 +8,17 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from cellplan.errors import CellplanError, OverrunError
-from cellplan.guard.worker import Answer, WorkerJob
+from cellplan.guard.worker import Answer, WorkerJob, import_modules
 from cellplan.guard.worker_process import ChildProcess, Guard
 
 Value = TypeVar("Value")
+
+
+def begin_child(*modules: str) -> None:
+    """Start the child process, which imports modules of later jobs meanwhile; nothing where it runs already."""
+    with _lock:
+        if not (_running and _running[0].is_usable):
+            _child().begin(job_here(import_modules, modules, Guard(file="", worker="the imports")))
 
 
 def in_child(function: Callable[..., Value], *arguments: object, guard: Guard) -> Value:

@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any, Final, NamedTuple
 
 from cellplan.errors import CellplanError
@@ -52,6 +53,12 @@ def serve() -> None:
             return
         answers.write(pickle.dumps(_done(job)))
         answers.flush()
+
+
+def import_modules(*names: str) -> None:
+    """Import what later jobs need."""
+    for name in names:
+        import_module(name)
 
 
 def _end_with_parent() -> None:

@@ -47,11 +47,18 @@ class ChildProcess:
             env={**os.environ, **dict.fromkeys(ONE_THREAD, "1")},
         )
         self._has_path = False
+        self._unread = 0  # answers to jobs that were begun only
 
     @property
     def is_usable(self) -> bool:
         """Whether the process runs and belongs to this one; a fork has pipes that are not its own."""
         return self.owner == os.getpid() and self._process.poll() is None
+
+    def begin(self, job: WorkerJob) -> None:
+        """Hand over a job whose answer does not matter, and do not wait for it."""
+        with contextlib.suppress(OSError):  # the next job finds out that the process has ended
+            self._send(job)
+            self._unread += 1
 
     def ask(self, job: WorkerJob, guard: Guard) -> Answer:
         """Answer to a job; the process is ended when there is none, and after an interruption."""
@@ -90,15 +97,24 @@ class ChildProcess:
                 self._process.wait(KILL_TIMEOUT_S)
 
     def _exchange(self, job: WorkerJob) -> Answer:
-        """Send a job and wait for its answer."""
-        if self._process.stdin is None or self._process.stdout is None:
+        """Send a job and wait for its answer, which comes after those to jobs that were begun before."""
+        self._send(job)
+        if self._process.stdout is None:
+            raise EOFError
+        while self._unread:
+            pickle.load(self._process.stdout)  # noqa: S301 - written by our own child
+            self._unread -= 1
+        return pickle.load(self._process.stdout)  # noqa: S301 - likewise
+
+    def _send(self, job: WorkerJob) -> None:
+        """Send a job, after the path on which its modules are found."""
+        if self._process.stdin is None:
             raise EOFError
         if not self._has_path:
             pickle.dump(sys.path, self._process.stdin)
             self._has_path = True
         pickle.dump(job, self._process.stdin)
         self._process.stdin.flush()
-        return pickle.load(self._process.stdout)  # noqa: S301 - written by our own child
 
     def _end_late(self, late: threading.Event) -> None:
         """End a process that takes too long."""

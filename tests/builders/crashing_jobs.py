@@ -83,3 +83,8 @@ def leave_unless_in(home: int) -> str:
     if os.getpid() != home:
         os._exit(7)
     return "done at home"
+
+
+def loaded(names: tuple[str, ...]) -> list[str]:
+    """Those of some modules that the process has imported."""
+    return [name for name in names if name in sys.modules]

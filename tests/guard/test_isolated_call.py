@@ -1,4 +1,5 @@
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -9,7 +10,9 @@ import pytest
 from builders import crashing_jobs
 
 from cellplan.errors import CellplanError, InvalidFileError, OverrunError
-from cellplan.guard import Guard, in_child
+from cellplan.files.cell.reader_process import begin_reading
+from cellplan.guard import Guard, begin_child, in_child
+from cellplan.guard.isolated_call import _end_child, _running
 
 READER = Guard(file="arm.urdf", worker="the URDF reader", seconds=20.0)
 needs_posix = pytest.mark.skipif(os.name == "nt", reason="signals and limits are those of Linux and macOS")
@@ -100,7 +103,6 @@ def test_ctrl_c_is_left_to_the_parent() -> None:
 
 @needs_posix
 def test_an_interruption_ends_the_child_and_the_next_job_gets_its_own_answer() -> None:
-    import signal
     import threading
 
     in_child(crashing_jobs.process, guard=READER)
@@ -135,6 +137,53 @@ def test_a_file_named_as_a_module_in_the_working_folder_is_not_run(tmp_path: Pat
 
     assert run.stdout == "3\n", run.stderr
     assert not (tmp_path / "was-run").exists()
+
+
+def test_a_process_that_was_begun_has_imported_modules_for_the_next_job_and_answers_it_alone() -> None:
+    _end_child()
+
+    begin_child("colorsys", "no.such.module")
+    begin_child("chunk")  # it runs already
+
+    assert in_child(crashing_jobs.loaded, ("colorsys", "chunk"), guard=READER) == ["colorsys"]
+    assert in_child(crashing_jobs.same, 5, guard=READER) == 5
+
+
+def test_a_begun_process_that_has_ended_is_replaced() -> None:
+    first = in_child(crashing_jobs.process, guard=READER)
+    os.kill(first, signal.SIGKILL)
+    while _running[0].is_usable:
+        time.sleep(0.01)
+    begin_child("colorsys")
+
+    assert in_child(crashing_jobs.process, guard=READER) not in {first, os.getpid()}
+
+
+@pytest.mark.parametrize(
+    ("text", "modules"), [("model: kuka_kr16_2", []), ("mesh: part.STL", ["mesh"]), ("m: a.urdf", ["urdf", "mesh"])]
+)
+def test_readers_are_begun_for_the_files_that_a_cell_seems_to_name(
+    text: str, modules: list[str], tmp_path: Path
+) -> None:
+    _end_child()
+    cell = tmp_path / "cell.yaml"
+    cell.write_text(text, encoding="utf-8")
+    names = {"urdf": "cellplan.files.robots.urdf.load", "mesh": "cellplan.geometry.mesh.load"}
+
+    begin_reading(cell)
+
+    assert bool(_running) is bool(modules)
+    loaded = in_child(crashing_jobs.loaded, (*names.values(), "pydantic"), guard=READER)
+    assert loaded == [names[name] for name in modules]
+
+
+@pytest.mark.parametrize("cell", [None, Path("no/such/cell.yaml"), Path("/")])
+def test_nothing_is_begun_for_a_cell_that_cannot_be_read(cell: Path | None) -> None:
+    _end_child()
+
+    begin_reading(cell)
+
+    assert not _running
 
 
 def test_a_cell_without_files_of_its_own_needs_no_child(cells: Path) -> None:

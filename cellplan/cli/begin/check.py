@@ -54,6 +54,9 @@ def check(options: CheckOptions) -> Result:
 
 def _checked(options: CheckOptions, follow: "Callable[[Cell], None]", progress: Listener) -> Result:
     """Read and check a cell; ``follow`` is called with the cell as soon as it is read."""
+    from cellplan.files.cell.reader_process import begin_reading
+
+    begin_reading(options.cell)
     from cellplan.files.cell.load import load_cell, with_names
     from cellplan.runs.overrides import with_overrides
 

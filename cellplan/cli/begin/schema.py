@@ -24,7 +24,7 @@ def schema(options: SchemaOptions) -> None:
     if options.robot + options.report + options.series + options.layout > 1:
         raise typer.BadParameter("expected at most one of --robot, --report, --series and --layout")
     if options.robot:
-        from cellplan.files.schema import robot_table_schema
+        from cellplan.files.schema.json_schemas import robot_table_schema
 
         say_json(robot_table_schema())
     elif options.report or options.series or options.layout:
@@ -34,6 +34,6 @@ def schema(options: SchemaOptions) -> None:
         say_json(report_schema() if options.report else series_schema() if options.series else layout_schema())
     else:
         from cellplan.files.robots.joint_table import bundled_names
-        from cellplan.files.schema import json_schema
+        from cellplan.files.schema.json_schemas import json_schema
 
         say_json(json_schema(bundled_names()))

@@ -65,6 +65,9 @@ def recover(options: RecoverOptions) -> Result:
     too. Exit status: 0 written, 1 a check fails, 2 bad input, or a run that is changed or stale, 3 no recovery was
     found (the reason is written, no tables), 4 internal error.
     """
+    from cellplan.files.cell.reader_process import begin_reading
+
+    begin_reading(options.cell)
     from cellplan.jobs.recover.refusals import default_folder, refuse_recovery, refuse_unless_recoverable
     from cellplan.programs.export.exporters import formats_for
     from cellplan.runs.gate.open_gate import open_gate

@@ -93,8 +93,12 @@ def export(options: ExportOptions) -> Result:
     fails, 2 bad input, or a run that is changed or stale, 4 internal error. One format is written only if it is 0. Of
     several each is written or refused by itself; 1 or 2 if one that was named is refused, or all are.
     """
-    from cellplan.files.run.folder import PROGRAMS
+    from cellplan.files.cell.reader_process import begin_reading
     from cellplan.programs.export.exporters import chosen_formats, refuse_choice
+
+    formats = chosen_formats(options.forms)
+    begin_reading(options.cell)
+    from cellplan.files.run.folder import PROGRAMS
     from cellplan.programs.export.refusals import (
         NothingFitsError,
         default_folder,
@@ -103,7 +107,6 @@ def export(options: ExportOptions) -> Result:
     )
     from cellplan.runs.gate.open_gate import open_gate
 
-    formats = chosen_formats(options.forms)
     if options.escape and not all(formats.values()):
         raise InputError("--escape: expected the formats by name, got all")
     require_choice(options.cell, without_cell=options.without_cell)

@@ -286,19 +286,17 @@ def without_gap_lines(lines: Sequence[str], *, source: str, first_line: int) -> 
 
     The first of them is so many lines, from 1, into the source; an ``InputError`` has the line of another comment.
     """
-    rows: list[str] = []
     gaps: dict[int, str] = {}
-    for number, line in enumerate(lines, start=first_line):
-        if not line.startswith("#"):
-            rows.append(line)
-            continue
+    for before, place in enumerate([place for place, line in enumerate(lines) if line.startswith("#")]):
+        line, row = lines[place], place - before
         match = _GAP.fullmatch(line)
         if match is None:
-            raise InputError(f"{source}:{number}: expected a row, or '# {NOT_IN_PROGRAM}: A to B', got {line[:60]!r}")
-        if not rows or len(rows) in gaps or number == first_line + len(lines) - 1:
-            raise InputError(f"{source}:{number}: expected '# {NOT_IN_PROGRAM}' between two rows only")
-        gaps[len(rows)] = match[1]
-    return rows, gaps
+            expected = f"a row, or '# {NOT_IN_PROGRAM}: A to B', got {line[:60]!r}"
+            raise InputError(f"{source}:{first_line + place}: expected {expected}")
+        if row == 0 or row in gaps or place == len(lines) - 1:
+            raise InputError(f"{source}:{first_line + place}: expected '# {NOT_IN_PROGRAM}' between two rows only")
+        gaps[row] = match[1]
+    return [line for line in lines if not line.startswith("#")] if gaps else [*lines], gaps
 
 
 def line_of_row(row: int, gaps: Mapping[int, str], *, first_line: int) -> int:

@@ -9,7 +9,7 @@ from typing import Final
 from cellplan.errors import InputError
 from cellplan.files.robots.joint_table import bundled_names
 from cellplan.files.run.drafts import hidden_folders
-from cellplan.files.schema import json_schema, robot_table_schema
+from cellplan.files.schema.json_schemas import json_schema, robot_table_schema
 from cellplan.files.templates.catalogue import Template
 
 PACKAGE: Final = Path(__file__).resolve().parents[2]

@@ -9,7 +9,7 @@ from cellplan.files.input.findings import listed
 from cellplan.files.run.content import RECOVER, RECOVERY
 from cellplan.files.run.folder import refuse_unless_replaceable
 from cellplan.model.cell.cell import Cell
-from cellplan.model.motion.motion import Motion
+from cellplan.model.motion.motion import ClockTable, Motion
 from cellplan.model.report.exported import ExportFrame, Promise
 from cellplan.model.report.verified_run import AnyRun, ReadRun
 from cellplan.programs.dialects import DIALECTS
@@ -39,12 +39,14 @@ def refuse_recovery(
     run: ReadRun, *, at: float, frozen: Mapping[str, float], keep: Collection[str], formats: Iterable[str]
 ) -> None:
     """Refuse a recovery, and its programs in some formats, of which the files of a run say that they cannot be."""
-    refuse_state(run.cell, run.motion, at=at, frozen=frozen, keep=keep)
+    refuse_state(run.cell, run.clock(), at=at, frozen=frozen, keep=keep)
     for form in formats:
         recovery_frame(run, form)
 
 
-def refuse_state(cell: Cell, motion: Motion, *, at: float, frozen: Mapping[str, float], keep: Collection[str]) -> None:
+def refuse_state(
+    cell: Cell, motion: Motion | ClockTable, *, at: float, frozen: Mapping[str, float], keep: Collection[str]
+) -> None:
     """Refuse what ``stopped_state`` cannot make, and robots that hold the part at different times; call it early."""
     names = [robot.name for robot in cell.robots]
     _require_time(motion, at, "--at")
@@ -68,7 +70,7 @@ def standing_times(cell: Cell, at: float, frozen: Mapping[str, float]) -> dict[s
     return {robot.name: float(frozen.get(robot.name, at)) for robot in cell.robots}
 
 
-def _require_time(motion: Motion, time: float, option: str) -> None:
+def _require_time(motion: Motion | ClockTable, time: float, option: str) -> None:
     """Refuse a time at which the program has no rows."""
     end = float(motion.times[-1])
     if not -END <= time <= end + END:

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.model.cell.cell import Cell
-from cellplan.model.motion.motion import JointTable, Motion, Schedule
+from cellplan.model.motion.motion import ClockTable, JointTable, Motion, Schedule
+from cellplan.model.motion.plan import Phase
 from cellplan.model.presented import Presented
 from cellplan.model.report.report import Report, verdict
 
@@ -21,6 +22,8 @@ class ReadRun:
     digest: str  # SHA-256 of its manifest
     cell: Cell  # the cell that was solved
     motions: tuple[str, ...]  # names of its phases, empty for the only one
+    phases: tuple[Phase, ...]  # the phases of its program as the cell has them, not yet on a clock
+    clock: Callable[[], ClockTable]  # reads the clock of the program, which is compared with the cell with its rows
     rows: Callable[[], Motion]  # reads all rows of the program, once: many refusals need none of them
     names: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of files of other names than those of the run
 

@@ -4,7 +4,7 @@ from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import count
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,11 @@ from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import is_rigid
 from cellplan.model.robot.controller import ControllerZero
-from cellplan.model.settings.robot import BodyAccuracyEntry, PayloadEntry, ReachEntry
 from cellplan.model.settings.units import Deg, Mm, in_si
 from cellplan.model.units import DisplayUnit, joint_unit
+
+if TYPE_CHECKING:  # robots are read by processes of their own, without schemas of files
+    from cellplan.model.settings.robot import BodyAccuracyEntry, PayloadEntry, ReachEntry
 
 ROUNDING = 1e-9  # [rad] of written angles
 BASE = -1  # index of the link that does not move, where a link is named by the joint that carries it
@@ -146,12 +148,12 @@ class RobotModel:
     followers: tuple[FollowerJoint, ...] = ()
     links: tuple[Link, ...] = ()  # links on which something can be mounted, by the names of the robot's file
     # how good the link bodies are that do not say it themselves; None when it is not stated
-    body_accuracy: BodyAccuracyEntry | None = None
-    payload: PayloadEntry | None = None  # what it may carry; None when it is not stated
+    body_accuracy: "BodyAccuracyEntry | None" = None
+    payload: "PayloadEntry | None" = None  # what it may carry; None when it is not stated
     # pairs of link bodies, by name, that its SRDF leaves out of collision checks, with the reason
     disabled: tuple[tuple[str, str, str], ...] = ()
     controller: ControllerZero | None = None  # how its controller counts the joints; None when it is not stated
-    reach: ReachEntry | None = None  # reach as the maker publishes it; None when it is not stated
+    reach: "ReachEntry | None" = None  # reach as the maker publishes it; None when it is not stated
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""

@@ -56,31 +56,29 @@ class Switch(NamedTuple):
     """What statements of a maker begin and end; groups other than ``state`` and ``routine`` are alike in both."""
 
     example: str
-    on: re.Pattern[str]
-    off: re.Pattern[str]
+    on: str  # pattern of all of a statement
+    off: str
     form: StatementForm = StatementForm.LINE
     is_output: bool = False
+    has_case: bool = False  # whether capitals count
 
-
-def _switch(
-    example: str, on: str, off: str, *, form: StatementForm = StatementForm.LINE, has_case: bool = False
-) -> Switch:
-    """A switch of which the patterns are given."""
-    flags = re.ASCII if has_case else re.ASCII | re.IGNORECASE
-    return Switch(example, re.compile(on, flags), re.compile(off, flags), form)
+    def match(self, text: str, *, on: bool) -> re.Match[str] | None:
+        """How a text begins or ends something; None if it does not."""
+        flags = re.ASCII if self.has_case else re.ASCII | re.IGNORECASE
+        return re.fullmatch(self.on if on else self.off, text, flags)
 
 
 def _same(example: str, pattern: str, *, is_output: bool = False, has_case: bool = False) -> Switch:
     """An output that has one state and then the other, or a call of a routine and one of another."""
-    return _switch(example, pattern, pattern, has_case=has_case)._replace(is_output=is_output)
+    return Switch(example, pattern, pattern, is_output=is_output, has_case=has_case)
 
 
 _ARC_VALUES: Final = r"AC=\d{1,3} AVP?=\d{1,3}(?:\.\d)?(?: T=\d{1,2}(?:\.\d{1,2})?)?"
 _WEAVE_VALUE: Final = rf"{_NUMBER}(?:Hz|mm|s)?"
-INNER_MOVE: Final = re.compile(rf"{_ABB_HEAD}{_ABB_MOVE}", re.ASCII | re.IGNORECASE)
+INNER_MOVE: Final = rf"{_ABB_HEAD}{_ABB_MOVE}"
 STATEMENTS: Final[Mapping[str, tuple[Switch, ...]]] = {
     "abb": (
-        _switch(
+        Switch(
             r"ArcLStart {point}, {speed}, seam1, weld1, {zone}, {tool} \WObj:={frame};",
             rf"{_ABB_HEAD}(?:Start| ?\\On,){_ABB_MOVE}",
             rf"{_ABB_HEAD}(?:End| ?\\Off,){_ABB_MOVE}",
@@ -89,18 +87,18 @@ STATEMENTS: Final[Mapping[str, tuple[Switch, ...]]] = {
         _same("SetDO doArc,1;", rf"SetDO (?P<name>{_ID}), ?(?P<state>0|1|low|high);?", is_output=True),
     ),
     "fanuc": (
-        _switch(
+        Switch(
             "Weld Start[1,1]",
             rf"(?P<name>Arc|Weld) Start(?P<unit> E[1-4])?\[{_N}(?:,{_NUMBER})?\]",
             rf"(?P<name>Arc|Weld) End(?P<unit> E[1-4])?\[{_N}(?:,{_NUMBER})?\]",
             form=StatementForm.SUFFIX,
         ),
-        _switch(
+        Switch(
             "Weave Sine[1]",
             rf"Weave (?:Sine|Circle|Figure 8|L)\[{_WEAVE_VALUE}(?:,{_WEAVE_VALUE}){{0,5}}\]",
             rf"Weave End(?:\[{_N}\])?",
         ),
-        _switch("Track TAST[1]", rf"Track (?:TAST|AVC)\[{_N}\](?: RPM\[{_N}\])?", "Track End"),
+        Switch("Track TAST[1]", rf"Track (?:TAST|AVC)\[{_N}\](?: RPM\[{_N}\])?", "Track End"),
         _same("DO[1]=ON", rf"(?P<name>[DR]O\[{_N}\]) ?= ?(?P<state>ON|OFF)", is_output=True),
         _same("CALL GUN_ON", rf"CALL (?P<routine>{_ID})(?:\({_NUMBER}(?:, ?{_NUMBER})*\))?"),
     ),
@@ -131,12 +129,12 @@ STATEMENTS: Final[Mapping[str, tuple[Switch, ...]]] = {
         _same("gun_on()", rf"(?P<routine>(?!{_UR_WORDS}){_ID}){_ARGUMENTS}", has_case=True),
     ),
     "yaskawa": (
-        _switch(
+        Switch(
             "ARCON ASF#(1)",
             rf"ARCON(?: ASF#\({_N}\)| {_ARC_VALUES})?",
             rf"ARCOF(?: AEF#\({_N}\)| {_ARC_VALUES})?",
         ),
-        _switch("WVON WEV#(1)", rf"WVON WEV#\({_N}\)", "WVOF"),
+        Switch("WVON WEV#(1)", rf"WVON WEV#\({_N}\)", "WVOF"),
         _same("DOUT OT#(1) ON", rf"DOUT (?P<name>OT#\({_N}\)) (?P<state>ON|OFF)", is_output=True),
         _same("CALL JOB:GUN-ON", r"CALL JOB:(?P<routine>\w[\w-]{0,31})"),
     ),
@@ -223,7 +221,7 @@ def _differ(*states: str | None) -> bool:
 def read_statement(kind: str, text: str, *, on: bool, key: str = "") -> ReadStatement | None:
     """A statement that begins or ends a process, its slot ``{data}`` filled; None if the kind has no such one."""
     for switch in STATEMENTS[kind]:
-        if match := (switch.on if on else switch.off).fullmatch(text):
+        if match := switch.match(text, on=on):
             words = {name: word.lower() for name, word in match.groupdict().items() if word is not None}
             return ReadStatement(key, text, switch, words)
     return None
@@ -333,7 +331,7 @@ def _require_inner(process: ProcessStatementsEntry, first: ReadStatement, data: 
         return
     if not is_move:
         raise rule("unexpected key, it applies where on and off are motions", "process.inner")
-    match = INNER_MOVE.fullmatch(process.inner.replace(DATA_SLOT, data))
+    match = re.fullmatch(INNER_MOVE, process.inner.replace(DATA_SLOT, data), re.ASCII | re.IGNORECASE)
     if match is None or match["name"].lower() != first.words["name"]:
         text = f"expected a motion of the same name as {first.text!r}, neither its start nor its end, "
         raise rule(f"{text}got {process.inner!r}", "process.inner")

@@ -3,14 +3,16 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
-from pydantic import GetCoreSchemaHandler
-from pydantic_core import CoreSchema, core_schema
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.units import MM, joint_unit
+
+if TYPE_CHECKING:  # robots are read by processes of their own, without schemas of files
+    from pydantic import GetCoreSchemaHandler
+    from pydantic_core import CoreSchema
 
 NEIGHBOURS: Final = 3  # units in the last place round the quotient in which the written number is sought
 
@@ -24,8 +26,10 @@ class Quantity(float):
         return self / MM
 
     @classmethod
-    def __get_pydantic_core_schema__(cls, source: type[Self], handler: GetCoreSchemaHandler) -> CoreSchema:
+    def __get_pydantic_core_schema__(cls, source: type[Self], handler: "GetCoreSchemaHandler") -> "CoreSchema":
         """A number without bounds, which then gets its unit."""
+        from pydantic_core import core_schema
+
         return core_schema.no_info_after_validator_function(cls, core_schema.float_schema())
 
 
@@ -78,8 +82,10 @@ class Within:
     gt: float | None = None
     le: float
 
-    def __get_pydantic_core_schema__(self, source: type[Quantity], handler: GetCoreSchemaHandler) -> CoreSchema:
+    def __get_pydantic_core_schema__(self, source: type[Quantity], handler: "GetCoreSchemaHandler") -> "CoreSchema":
         """A number within the bounds, which then gets its unit."""
+        from pydantic_core import core_schema
+
         number = core_schema.float_schema(ge=self.ge, gt=self.gt, le=self.le)
         return core_schema.no_info_after_validator_function(source, number)
 

@@ -16,10 +16,11 @@ from cellplan.programs.elements.joints import Axes
 SHARES: Final = (0.5, 0.35, 0.25, 0.15, 0.1, 0.05, 0.0)  # [-] of a segment, the largest first
 Render = Callable[[ExportJob], dict[str, str]]
 Read = Callable[[ExportFrame, Mapping[str, str]], tuple[ProgramRows, ...]]
-Demands = Callable[[ExportFrame, int], Iterator[Callable[[], object]]]  # the rows of its longest program are counted
+# the rows of its longest program are counted, which takes the time to read them, where it is called
+Demands = Callable[[ExportFrame, Callable[[], int]], Iterator[Callable[[], object]]]
 
 
-def no_demands(_frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+def no_demands(_frame: ExportFrame, _rows: Callable[[], int]) -> Iterator[Callable[[], object]]:
     """Those of a format that needs nothing of the cell."""
     return iter(())
 

@@ -208,7 +208,7 @@ def with_register(dialect: Dialect, form: EscapeForm) -> Dialect:
             require_same(path, text, form.layout(files[path]))
         return dialect.read(frame, blank)
 
-    def demands(frame: ExportFrame, rows: int) -> Iterator[Callable[[], object]]:
+    def demands(frame: ExportFrame, rows: Callable[[], int]) -> Iterator[Callable[[], object]]:
         yield partial(_require_one_program, frame)
         yield from (partial(form.require, frame, robot) for robot in frame.robots)
         yield from dialect.demands(frame, rows)

@@ -11,7 +11,6 @@ from cellplan.model.motion.motion import JointTable
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.dialects import DIALECTS, ESCAPES
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.escapes import with_register
 from cellplan.programs.export.choice import Choice
 from cellplan.programs.formats.csv import DECIMALS as CSV_DECIMALS
 from cellplan.programs.wide_table import read_wide_tables, render_wide_tables
@@ -49,6 +48,8 @@ def exporter_of(form: str, choice: Choice) -> Dialect | Exporter:
         return dialect
     if form not in ESCAPES or not isinstance(dialect, Dialect):
         raise InputError(f"--escape: expected one of the formats {listed(ESCAPES)}, got {form}")
+    from cellplan.programs.elements.escapes import with_register
+
     return with_register(dialect, ESCAPES[form])
 
 

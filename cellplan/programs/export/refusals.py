@@ -18,7 +18,7 @@ from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import Choice, exported_robots, refuse_unknown_robots
 from cellplan.programs.export.exporters import EXPORTERS, exporter_of, refuse_choice
 from cellplan.programs.promises.promises import require_promise
-from cellplan.programs.promises.run_programs import run_programs
+from cellplan.programs.promises.run_programs import holders_rest, run_programs
 from cellplan.programs.promises.stations import stations
 from cellplan.programs.rows.resample import lead_time
 
@@ -157,6 +157,8 @@ def refuse_unfit(run: ReadRun | UnsolvedRun, dialect: Dialect, choice: Choice) -
         robots = exported_robots(run.cell, dialect, choice.robots)
     elif not robots:  # or else what those need that have no controller yet is said too
         raise_findings(unmet)
+    if not unmet and isinstance(run, ReadRun):
+        _refuse_unstated(run, dialect, robots, choice)
     usual = dialect.promises[0 if dialect.most_arms is None else -1]  # arms of controllers that are not known yet
     best = promise = choice.promise or usual
     try:
@@ -170,6 +172,22 @@ def refuse_unfit(run: ReadRun | UnsolvedRun, dialect: Dialect, choice: Choice) -
         raise NotVerifiedError([*error.findings, *needed]) from None
     frame = frame_of(run, dialect, robots, promise if unmet else best, choice)
     raise_findings([*unmet, *unmet_demands(run, dialect, frame, choice)])
+
+
+def _refuse_unstated(run: ReadRun, dialect: Dialect, robots: Sequence[str], choice: Choice) -> None:
+    """Refuse what a cell does not state before the rows of its run are read, where these decide no promise.
+
+    A promise that they keep a format from making is refused first: what is missing is said beside it.
+    """
+    if not holders_rest(run.cell, run.phases):
+        return
+    unsolved = UnsolvedRun(cell=run.cell)
+    try:
+        promise = require_promise(unsolved, dialect, robots, requested=choice.promise, moves=choice.moves)
+    except (InputError, NotVerifiedError):
+        return
+    if promise.waits:
+        raise_findings(unmet_demands(unsolved, dialect, frame_of(unsolved, dialect, robots, promise, choice), choice))
 
 
 def unmet_demands(run: AnyRun, dialect: Dialect, frame: ExportFrame, choice: Choice) -> Iterator[InputError]:
@@ -186,7 +204,10 @@ def unmet_demands(run: AnyRun, dialect: Dialect, frame: ExportFrame, choice: Cho
         )
     if frame.promise.waits:
         yield from refusals(*(partial(require_signals, frame, robot.name) for robot in frame.cell.robots))
-    rows = max((len(program.times) for program in run_programs(run)), default=0)
+
+    def rows() -> int:
+        return max((len(program.times) for program in run_programs(run)), default=0)
+
     yield from refusals(lambda: raise_findings(refusals(*dialect.demands(frame, rows))))
 
 

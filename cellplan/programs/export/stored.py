@@ -16,7 +16,7 @@ from cellplan.programs.export.choice import Choice
 
 Word = TypeVar("Word", Promise, Moves)
 
-SCHEMA: Final = "cellplan.programs.formats/2"
+SCHEMA: Final = "cellplan.export/2"
 SIZE_LIMIT: Final = 50_000_000  # [bytes] of a record: marks of many phases
 FILE_LIMIT: Final = 2_000_000_000  # [bytes] of a program
 IGNORED: Final = ".DS_Store"  # put into every folder by the file manager of one system

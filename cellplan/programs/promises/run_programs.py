@@ -1,12 +1,13 @@
 """Programs of a run: each with its phases, where tools are in process, and where holders move."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.plan import Phase
 from cellplan.model.report.verified_run import AnyRun, UnsolvedRun
 from cellplan.model.task.task import Frame
 from cellplan.planning.timing.schedule import TIME_DECIMALS
@@ -88,6 +89,15 @@ def spoilt_by_another_order(cell: Cell, program: RunProgram) -> Iterator[str]:
                 f"{_where(program, spoilt)}: the part moves while the tool of '{work.robot}' is in process ('{task}'): "
                 f"another order spoils the tool path"
             )
+
+
+def holders_rest(cell: Cell, phases: Iterable[Phase]) -> bool:
+    """Whether no order of the robots spoils anything in any motion of some phases: see ``spoilt_by_another_order``."""
+    tasks = [(phase, cell.task(name)) for phase in phases for name in phase.tasks]
+    return len(cell.positioners) < 2 and all(
+        task.relative_to is Frame.WORLD or not ({*cell.positioners} - {*unit_of(cell, task.robot)}) & {*phase.moving}
+        for phase, task in tasks
+    )
 
 
 def moving_robots(cell: Cell, program: RunProgram) -> tuple[str, ...]:

@@ -14,7 +14,8 @@ from jsonschema import Draft202012Validator
 from cellplan.errors import InvalidFileError
 from cellplan.files.cell.load import load_cell
 from cellplan.files.input.findings import key_text
-from cellplan.files.schema import CellDocument, RobotTableDocument, json_schema, robot_table_schema
+from cellplan.files.schema import CellDocument, RobotTableDocument
+from cellplan.files.schema.json_schemas import json_schema, robot_table_schema
 from cellplan.files.yaml.reader import parse_yaml
 from cellplan.files.yaml.writer import yaml_text
 

@@ -172,8 +172,8 @@ def test_untouched_programs_are_verified(exports: dict[str, Path], run: Verified
     [
         (
             "schema",
-            "cellplan.programs.formats/1",
-            "schema: expected 'cellplan.programs.formats/2', got 'cellplan.programs.formats/1'",
+            "cellplan.export/1",
+            "schema: expected 'cellplan.export/2', got 'cellplan.export/1'",
         ),
         ("run", 64 * "0", "the programs were made from another run"),
         ("promise", "sequence only", "promise: expected 'timed', got 'sequence only'"),

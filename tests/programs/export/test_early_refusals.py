@@ -14,8 +14,9 @@ from builders.seam_jobs import seam_job
 from cellplan import open_gate
 from cellplan.cli.main import run as run_command
 from cellplan.errors import InputError, NotVerifiedError
-from cellplan.jobs.recover.refusals import refuse_state
+from cellplan.jobs.recover.refusals import refuse_recovery, refuse_state
 from cellplan.model.motion.motion import Motion
+from cellplan.model.motion.plan import Hold
 from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import ReadRun
 from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry, KindName, RobotControlEntry
@@ -40,6 +41,10 @@ def on(read: ReadRun, kind: KindName, *, handshake: HandshakeEntry | None = None
     robots = tuple(replace(robot, control=control) for robot in read.cell.robots)
     controllers = {"c": ControllerEntry(kind=kind, **stated)}
     return replace(read, cell=replace(read.cell, robots=robots, controllers=controllers))
+
+
+def no_rows() -> Motion:
+    raise InputError("the rows were read")
 
 
 def refusing(form: str, choice: Choice) -> Callable[[ReadRun], None]:
@@ -91,11 +96,8 @@ def test_every_robot_without_a_controller_is_named(read: ReadRun) -> None:
 def test_what_needs_no_rows_is_refused_without_them_and_without_engines(
     sound: Path, read: ReadRun, tmp_path: Path
 ) -> None:
-    def rows() -> Motion:
-        raise InputError("the rows were read")
-
     with pytest.raises(InputError) as refusal:
-        refusing("csv", Choice(robots=("lefty",)))(replace(read, rows=rows))
+        refusing("csv", Choice(robots=("lefty",)))(replace(read, rows=no_rows))
     words = ["export", str(sound / "run"), "--format", "csv", "--robot", "lefty", "-o", str(tmp_path / "csv"), "-q"]
     words += ["--cell", str(sound / "cell" / "small.yaml")]
     command = [sys.executable, "-X", "importtime", "-m", "cellplan", *words]
@@ -132,6 +134,30 @@ def test_signals_of_all_robots_and_their_names_are_said_at_once(read: ReadRun) -
         assert f"robots.left.controller.handshake.inputs: expected the input that '{name}' sets, got none" in said
     for name in NAMES:
         assert f"robots.{name}.controller.handshake.output: expected a whole number from 1 to 4096" in said
+
+
+@pytest.mark.parametrize("promise", [None, Promise.SEQUENCE_ONLY])
+def test_what_a_cell_with_the_part_at_rest_does_not_state_is_refused_without_rows(
+    read: ReadRun, promise: Promise | None
+) -> None:
+    """The rows of a part that moves decide the promise first: they are read."""
+    kukas = replace(on(read, "kuka", handshake=HandshakeEntry(output="x", inputs={"left": "y"})), rows=no_rows)
+    held = {name: Hold() for name in read.cell.positioners}
+    at_rest = tuple(replace(phase, roles={**phase.roles, **held}) for phase in read.phases)
+
+    with pytest.raises(InputError) as refusal:
+        refuse_unfit(replace(kukas, phases=at_rest), DIALECTS["krl"], Choice(promise=promise))
+    with pytest.raises(InputError, match=r"^the rows were read$"):
+        refuse_unfit(kukas, DIALECTS["krl"], Choice(promise=promise))
+
+    assert "robots.left.controller.handshake.inputs: expected the input that 'right' sets" in str(refusal.value)
+
+
+def test_a_time_after_the_end_of_a_program_is_refused_by_its_clock(read: ReadRun) -> None:
+    with pytest.raises(InputError) as refusal:
+        refuse_recovery(replace(read, rows=no_rows), at=99.0, frozen={}, keep=(), formats=())
+
+    assert str(refusal.value) == f"--at: expected a time of the program, 0 to {read.motion.times[-1]:g} s, got 99"
 
 
 def test_the_cure_is_no_controller_that_all_robots_have_already(read: ReadRun) -> None:

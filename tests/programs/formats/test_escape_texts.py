@@ -306,7 +306,7 @@ def test_a_register_may_have_another_name_and_none_that_the_language_has(
     dialect = with_register(DIALECTS[form], ESCAPES[form])
 
     assert expected in dialect.render(replace(job, frame=frame))[path]
-    (finding,) = refusals(*dialect.demands(frame, 0))
+    (finding,) = refusals(*dialect.demands(frame, int))
     assert f"beta.controller.step_register: {refusal}, got '{registers[1]}'" in str(finding)
 
 
@@ -324,7 +324,7 @@ def test_registers_of_two_robots_of_a_fanuc_controller_do_not_overlap(register: 
     frame = replace(frame, cell=replace(frame.cell, robots=robots))
 
     said = [
-        str(error) for error in refusals(*with_register(DIALECTS["fanuc_ls"], ESCAPES["fanuc_ls"]).demands(frame, 0))
+        str(error) for error in refusals(*with_register(DIALECTS["fanuc_ls"], ESCAPES["fanuc_ls"]).demands(frame, int))
     ]
 
     wanted = (

@@ -225,7 +225,7 @@ def test_a_closed_path_in_process_needs_levels_before_anything_is_computed(moves
         for levels in ((), (1.0,)):
             frame = small_corner(levels).frame
             cell = replace(frame.cell, tasks=(replace(frame.cell.tasks[0], path=path),))
-            findings = list(refusals(*INFORM.demands(replace(frame, cell=cell, moves=moves), 0)))
+            findings = list(refusals(*INFORM.demands(replace(frame, cell=cell, moves=moves), int)))
             assert len(findings) == (is_needed and is_closed and not levels)
             assert all("box.position_levels_mm: expected the distances of PL=1" in str(it) for it in findings)
 

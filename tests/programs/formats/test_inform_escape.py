@@ -187,7 +187,7 @@ def test_what_no_job_counts_is_refused(job: ExportJob, changes: dict[str, object
     cell = replace(frame.cell, robots=robots)
     changed = replace(frame, cell=cell, robots=(name,), promise=changes.get("promise", frame.promise))  # type: ignore[arg-type]
 
-    findings = refusals(*with_register(INFORM, INFORM_ESCAPE).demands(changed, 0))
+    findings = refusals(*with_register(INFORM, INFORM_ESCAPE).demands(changed, int))
 
     assert any(words in str(finding) for finding in findings)
 
@@ -203,7 +203,7 @@ def test_variables_of_two_robots_of_a_controller_do_not_overlap(
     robots = (one, replace(other, control=other.control.model_copy(update=stated)))  # the first with D081 to D084
     frame = replace(job.frame, cell=replace(job.frame.cell, robots=robots))
 
-    said = [str(finding) for finding in refusals(*with_register(INFORM, INFORM_ESCAPE).demands(frame, 0))]
+    said = [str(finding) for finding in refusals(*with_register(INFORM, INFORM_ESCAPE).demands(frame, int))]
 
     wanted = (
         f"robots.beta.controller.step_register: expected one 4 or more from that of '{ROBOT}' on the same controller"

@@ -187,7 +187,7 @@ def test_an_arm_without_its_positioner_and_escapes_of_both_are_refused(form: str
     dialect = KRL if form == "arm" else with_register(KRL, KRL_ESCAPE)
 
     with pytest.raises(InputError, match=words):
-        raise_findings(refusals(*dialect.demands(frame, 0)))
+        raise_findings(refusals(*dialect.demands(frame, int)))
 
 
 @pytest.mark.parametrize("name", CHANGES)

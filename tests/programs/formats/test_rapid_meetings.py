@@ -173,7 +173,7 @@ def test_escape_programs_ask_for_wires() -> None:
     escaping = with_register(RAPID, RAPID_ESCAPE)
 
     findings = []
-    for demand in escaping.demands(job.frame, 20):
+    for demand in escaping.demands(job.frame, lambda: 20):
         try:
             demand()
         except InputError as error:

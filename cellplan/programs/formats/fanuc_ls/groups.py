@@ -122,7 +122,7 @@ def motion_group(frame: ExportFrame, name: str) -> MotionGroup:
     return MotionGroup(robot=frame.robot(name), number=number, tool=tool, base=base)
 
 
-def demands(frame: ExportFrame, _rows: int = 0) -> Iterator[Callable[[], object]]:
+def demands(frame: ExportFrame, _rows: Callable[[], int] = int) -> Iterator[Callable[[], object]]:
     """What these programs need of the cell, of robots on controllers of the kind and of those without a controller."""
     for name in frame.robots:
         robot = frame.robot(name)

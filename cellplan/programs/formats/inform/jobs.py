@@ -116,7 +116,7 @@ def speed_text(feed: float, task: str) -> str:
     return text
 
 
-def demands(frame: ExportFrame, _rows: int = 0) -> Iterator[Callable[[], object]]:
+def demands(frame: ExportFrame, _rows: Callable[[], int] = int) -> Iterator[Callable[[], object]]:
     """What these jobs need of the cell, of robots on controllers of the kind and of those without a controller."""
     for name in frame.robots:
         robot = frame.robot(name)

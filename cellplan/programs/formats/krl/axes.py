@@ -32,7 +32,7 @@ def external_axes(frame: ExportFrame, robot: str) -> int:
     return len(Axes.of(frame.robot(robot)).external) + sum(len(order_of_axes(frame, name)) for name in others)
 
 
-def demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+def demands(frame: ExportFrame, _rows: Callable[[], int]) -> Iterator[Callable[[], object]]:
     """What these programs need of the cell."""
     for robot in played_robots(frame).robots:
         yield partial(require_numbers, frame, robot)

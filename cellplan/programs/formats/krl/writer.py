@@ -53,7 +53,7 @@ def render_krl(job: ExportJob) -> dict[str, str]:
     ``InputError`` for a robot without a KUKA controller, that is no arm of six axes with at most six others before it,
     lacks a signal, or has a position that cannot be written with the decimals.
     """
-    raise_findings(refusals(*demands(job.frame, 0)))
+    raise_findings(refusals(*demands(job.frame, int)))
     paths, files = _paths(job.frame), dict[str, str]()
     by_name = {program.name: program for program in job.programs}
     for (name, robot), path in paths.items():

@@ -77,7 +77,7 @@ SMALLEST_TOOL: Final = 50  # [um] a smaller zone of a tool is a stop
 
 def render_rapid(job: ExportJob) -> dict[str, str]:
     """Text of every file: a program file and the modules of each robot, in a folder for each of several programs."""
-    raise_findings(refusals(*_demands(job.frame, 0)))
+    raise_findings(refusals(*_demands(job.frame, int)))
     units, part = rapid_units(job.frame), part_frame(job.frame)
     files: dict[str, str] = {}
     for program in job.programs:
@@ -96,7 +96,7 @@ def render_rapid(job: ExportJob) -> dict[str, str]:
     return files
 
 
-def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+def _demands(frame: ExportFrame, _rows: Callable[[], int]) -> Iterator[Callable[[], object]]:
     """What these programs need of the cell."""
     if frame.promise is Promise.SYNCHRONISED and any(refusals(partial(require_one_controller, frame))):
         yield partial(require_one_controller, frame)  # all else may be as it is

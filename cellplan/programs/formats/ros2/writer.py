@@ -7,7 +7,6 @@ begins at the same point at its own time 0.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from itertools import pairwise
 from typing import Final
 
@@ -98,9 +97,9 @@ def _require_split(frame: ExportFrame, rows: int) -> None:
         raise InputError(f"--split: expected {SHORTEST} points or more, got {frame.split}")
 
 
-def _demands(frame: ExportFrame, rows: int) -> Iterator[Callable[[], object]]:
+def _demands(frame: ExportFrame, rows: Callable[[], int]) -> Iterator[Callable[[], object]]:
     """What trajectories need."""
-    yield partial(_require_split, frame, rows)
+    yield lambda: _require_split(frame, rows())
 
 
 def _head(job: ExportJob, program: ProgramRows, name: str) -> list[str]:

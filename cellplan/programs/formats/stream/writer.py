@@ -43,7 +43,7 @@ def render_stream(job: ExportJob) -> dict[str, str]:
     ``InputError`` where rows are not on the cycle of the controller, robots end at different times, or something that a
     controller needs is not stated.
     """
-    raise_findings(refusals(*_demands(job.frame, 0)))
+    raise_findings(refusals(*_demands(job.frame, int)))
     files = {}
     for program in job.programs:
         for name in job.frame.robots:
@@ -58,7 +58,7 @@ def render_stream(job: ExportJob) -> dict[str, str]:
     return files
 
 
-def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+def _demands(frame: ExportFrame, _rows: Callable[[], int]) -> Iterator[Callable[[], object]]:
     """What a stream needs of the cell."""
     for name in frame.robots:
         yield partial(_require_name, frame, name)

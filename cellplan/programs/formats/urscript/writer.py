@@ -52,7 +52,7 @@ def render_urscript(job: ExportJob) -> dict[str, str]:
     ``InputError`` for a robot that has other joints than six, a position beyond two turns, or lacks something that its
     program needs.
     """
-    raise_findings(refusals(*_demands(job.frame, 0)))
+    raise_findings(refusals(*_demands(job.frame, int)))
     names, files = function_names(job.frame), {}
     for program in job.programs:
         for name in job.frame.robots:
@@ -74,7 +74,7 @@ def render_urscript(job: ExportJob) -> dict[str, str]:
     return files
 
 
-def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+def _demands(frame: ExportFrame, _rows: Callable[[], int]) -> Iterator[Callable[[], object]]:
     """What these programs need of the cell."""
     for name in frame.robots:
         yield partial(decimals_of_urscript, frame, frame.robot(name))

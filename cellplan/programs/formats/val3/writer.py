@@ -67,7 +67,7 @@ def render_val3(job: ExportJob) -> dict[str, str]:
     position that cannot be written with the decimals.
     """
     paths = program_paths(job.frame, VAL3, PROJECTS)
-    raise_findings(refusals(*_demands(job.frame, 0)))
+    raise_findings(refusals(*_demands(job.frame, int)))
     if job.frame.promise is not Promise.PACED:
         return render_programs(job, VAL3, paths, _files)
     files: dict[str, str] = {}
@@ -76,7 +76,7 @@ def render_val3(job: ExportJob) -> dict[str, str]:
     return files
 
 
-def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+def _demands(frame: ExportFrame, _rows: Callable[[], int]) -> Iterator[Callable[[], object]]:
     """What these programs need of the cell."""
     for robot in frame.robots:
         yield partial(require_links, frame, robot)
