@@ -117,6 +117,7 @@ LONG = {  # their commands and functions have tests of their own, which are quic
     "README.md",
     "keep-the-branch.md",
     "assign-tasks.md",
+    "seams.md",
 }
 RUNNABLE = [pytest.param(page, marks=pytest.mark.slow if page.name in LONG else ()) for page in PAGES]
 

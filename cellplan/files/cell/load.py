@@ -27,6 +27,7 @@ from cellplan.files.cell.build.mounting import (
 from cellplan.files.cell.build.path import is_woven_by_controller
 from cellplan.files.cell.build.srdf import apply_srdfs
 from cellplan.files.cell.changes import changed, plain_values
+from cellplan.files.cell.expansion import expanded
 from cellplan.files.cell.layout.build_layout import read_layout
 from cellplan.files.cell.names import with_stated_names
 from cellplan.files.cell.open_tasks import open_task_findings, open_tasks, unknown_robot_findings, with_first_robots
@@ -114,14 +115,14 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
         InputError: The cell file cannot be read at all.
     """
     path = Path(path)
-    document = read_yaml(path, file=str(path))
+    document = expanded(read_yaml(path, file=str(path)))
     allowed = tuple(Path(folder) for folder in allow_dirs)
     return _read(CellFile(document=document, name=path.name, folder=folder or path.parent, allow_dirs=allowed))
 
 
 def load_copy(path: Path, cell: Cell) -> Cell:
     """A copy of a cell that was just read from its file: the same folders hold, and URDFs are not read again."""
-    source, document = cast("CellFile", cell.origin.source), read_yaml(path, file=str(path))
+    source, document = cast("CellFile", cell.origin.source), expanded(read_yaml(path, file=str(path)))
     return _read(replace(source, document=document, name=path.name, changes={}))
 
 
@@ -141,7 +142,7 @@ def load_open_cell(
         InputError: The cell file cannot be read at all.
     """
     path = Path(path)
-    document = changed(read_yaml(path, file=str(path)), values or {})
+    document = changed(expanded(read_yaml(path, file=str(path))), values or {})
     robots = open_tasks(document.root)
     source = CellFile(
         document=with_first_robots(document),

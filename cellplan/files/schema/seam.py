@@ -12,6 +12,7 @@ WALL_WORDS: Final = f"surface, left, right, {DIRECTION_WORDS}"
 MOST_WALLS: Final = 2  # beside one seam
 STEEPEST_DEG: Final = 90.0  # of a work angle: beyond it the tool is in the wall
 FLATTEST_DEG: Final = 80.0  # of a travel angle: beyond it the tool slides along the seam
+FARTHEST_PART_MM: Final = 100_000.0  # no path is longer
 FARTHEST_MM: Final = 500.0  # no tool works from farther away
 SURFACE: Final = "surface"
 SIDES: Final = ("left", "right")
@@ -21,18 +22,21 @@ WallChoice = Annotated[
     | Annotated[Vector, Tag("<list>")],
     by_kind(WALL_WORDS, list=tuple),
 ]
+WorkAngle = Annotated[Deg, Within(ge=-STEEPEST_DEG, le=STEEPEST_DEG)]
+Shift = Annotated[Mm, Within(ge=-FARTHEST_MM, le=FARTHEST_MM)]
 TravelAngle = Annotated[Deg, Within(ge=0.0, le=FLATTEST_DEG)]
 
 
-Length = Annotated[Mm, Within(gt=0.0, le=FARTHEST_MM)]
+Length = Annotated[Mm, Within(gt=0.0, le=FARTHEST_PART_MM)]
 Dwell = Annotated[float, Field(ge=0.0, le=10.0)]
+WeaveSide = Annotated[Mm, Within(gt=0.0, le=FARTHEST_MM)]
 OF_FEED: Final = ("frequency_hz", "dwell_left_s", "dwell_right_s")  # keys whose lengths follow from the feed
 
 
 class WeaveEntry(Entry):
     """How the tool tip swings about its path while it travels along it; the feed is that of travel."""
 
-    side_mm: Length = Field(description="Distance of each edge from the path, across travel and tool.")
+    side_mm: WeaveSide = Field(description="Distance of each edge from the path, across travel and tool.")
     form: Literal["sine", "zigzag", "triangle", "circle"] = setting(
         "sine",
         "Line of the weave: a sine; straight from edge to edge; straight from the root over both edges; round a centre "
@@ -86,7 +90,7 @@ class PathEntry(PathShapeEntry):
         alias="from",
         description="Wall that the work angle is measured from; required where there are two.",
     )
-    work_deg: Annotated[Deg, Within(ge=-STEEPEST_DEG, le=STEEPEST_DEG)] | None = setting(
+    work_deg: WorkAngle | None = setting(
         None,
         "Work angle: between the tool and the perpendicular to the wall under from, across the seam, towards the open "
         "side, away from the other wall: 45 for a fillet, 0 for a butt joint. Beside one wall, or two that face alike, "
@@ -101,6 +105,20 @@ class PathEntry(PathShapeEntry):
     standoff_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_MM)] | None = setting(
         None, "Distance of the tool tip from the path, against the tool's own axis; 0 when absent."
     )
+    side_mm: Shift | None = setting(
+        None,
+        "Distance of a pass from the path, across the weld face between the walls: positive towards the wall toward, "
+        "or to the left of travel beside one wall.",
+    )
+    out_mm: Shift | None = setting(None, "Distance of a pass from the path, out of the part between the walls.")
+    toward: Name | None = setting(None, "Wall that side_mm is positive towards; when absent the other one than from.")
+    from_mm: Length | None = setting(None, "Length of the path, as it is drawn, at which it is begun; 0 when absent.")
+    to_mm: Length | None = setting(None, "Length of the path at which it ends; its whole length when absent.")
+    reverse: bool | None = setting(
+        None, "Whether it is run along from its end to its begin. Walls stay where they are as it is drawn; push stays."
+    )
+    overlap_mm: Length | None = setting(None, "Length by which a closed path goes on past its start.")
+    back_mm: Length | None = setting(None, "Length by which the tool goes back at the end, held as it came.")
 
     weave: WeaveEntry | None = setting(
         None,
@@ -124,8 +142,9 @@ class PathEntry(PathShapeEntry):
             )
         if self.from_ is None and len(names) > 1:
             raise rule(f"missing, expected the wall that work_deg is measured from: {' or '.join(names)}", "from")
-        if self.from_ is not None and self.from_ not in names:
-            raise rule(f"expected one of the walls {' and '.join(names)}, got '{self.from_}'", "from")
+        for key, name in (("from", self.from_), ("toward", self.toward)):
+            if name is not None and name not in names:
+                raise rule(f"expected one of the walls {' and '.join(names)}, got '{name}'", key)
         walls = self.walls or {}
         for name, wall in walls.items():
             if wall == SURFACE and self.project is None:
@@ -134,11 +153,21 @@ class PathEntry(PathShapeEntry):
                 raise rule(f"expected a wall beside it that is no side of travel, got {wall}", f"walls.{name}")
         return self
 
+    @model_validator(mode="after")
+    def _has_a_stretch(self) -> Self:
+        """The begin before the end; past the start only goes what goes to the end."""
+        if self.to_mm is not None and self.to_mm <= (self.from_mm or 0.0):
+            raise rule(f"expected more than from_mm = {self.from_mm or 0.0:g}, got {self.to_mm:g}", "to_mm")
+        if self.overlap_mm is not None and (self.from_mm is not None or self.to_mm is not None):
+            raise rule("unexpected key beside from_mm and to_mm: a part of a path has two ends", "overlap_mm")
+        return self
+
     @property
     def is_seam(self) -> bool:
         """Whether the tool is held to walls."""
-        keys = (self.walls, self.from_, self.work_deg, self.push_deg, self.drag_deg, self.standoff_mm)
-        return any(key is not None for key in keys)
+        of_walls = self.walls, self.from_, self.toward
+        distances = self.standoff_mm, self.side_mm, self.out_mm
+        return any(it is not None for it in (*of_walls, *distances, self.work_deg, self.push_deg, self.drag_deg))
 
     @property
     def wall_names(self) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, Tag, WithJsonSchema, model_validator
 
+from cellplan.files.schema.expansion import MOST_PARTS, CraterEntry, PassEntry, StitchEntry, TacksEntry
 from cellplan.files.schema.robot import Configuration
 from cellplan.files.schema.seam import OF_FEED, PathEntry
 from cellplan.model.settings.checks import ToolDepth
@@ -246,6 +247,20 @@ class TaskEntry(Entry):
     weld_position: WeldPositionEntry | None = setting(
         None, "How the weld lies to gravity along the path; anyhow when absent."
     )
+    passes: tuple[PassEntry, ...] | None = setting(
+        None,
+        "Passes of the seam, one after the other, each a task: NAME_1, NAME_2 and so on.",
+        min_length=1,
+        max_length=MOST_PARTS,
+    )
+    stitch: StitchEntry | None = setting(
+        None, "Stitches of the seam, one after the other, each a task: NAME_1, NAME_2 and so on; excludes passes."
+    )
+    tacks: TacksEntry | None = setting(
+        None, "Tacks that are done before the seam, each a task with tack: true: NAME_t1, NAME_t2 and so on."
+    )
+    crater: CraterEntry | None = setting(None, "How the weld ends; only with a process.")
+    skip: bool | None = setting(None, "Whether the task is left out, and its name wherever it stands.")
     tack: bool = setting(False, "Whether it is a tack, which program.tacks_first has before all seams.")
     off_part: tuple[Literal["run_in", "run_out", "cut"], ...] = setting(
         (),
@@ -295,6 +310,17 @@ class TaskEntry(Entry):
         if self.standoff_mm is not None and self.standoff_mm[0] > self.standoff_mm[1]:
             low, high = (f"{value:g}" for value in self.standoff_mm)
             raise rule(f"expected [low, high], got [{low}, {high}]: the smaller distance comes first", "standoff_mm")
+        return self
+
+    @model_validator(mode="after")
+    def _agrees_with_parts(self) -> Self:
+        """A seam has passes or stitches; a crater is filled by a process."""
+        if self.passes is not None and self.stitch is not None:
+            raise rule("expected either passes or stitch, got both", "stitch")
+        if self.crater is not None and self.process is None:
+            raise rule("expected a process, which fills the crater", "crater")
+        if self.crater is not None and self.process is not None and self.process.off_delay_s:
+            raise rule("unexpected key, crater.time_s is this time: leave out one of them", "process.off_delay_s")
         return self
 
     @model_validator(mode="after")

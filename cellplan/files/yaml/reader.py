@@ -62,6 +62,7 @@ class YamlDocument:
     findings: tuple[Finding, ...]  # what the reader refused; the caller adds its own and raises all at once
     unreadable: frozenset[KeyPath]  # key paths whose value was refused
     changes: Mapping[KeyPath, str] = field(default_factory=dict)  # keys set after reading, with their texts in messages
+    sources: Mapping[KeyPath, KeyPath] = field(default_factory=dict)  # keys that stand elsewhere in the file, by where
 
     def line(self, path: KeyPath) -> int:
         """Line of a value; of the nearest enclosing one when the value is absent."""
@@ -86,8 +87,14 @@ class YamlDocument:
             if path[: len(place)] == place or (is_new and place[: len(path)] == path)
         ]
         if set_here:
-            return Finding(line=0, key=key_text(path), text=text, changes=set_here[-1])
-        return Finding(line=line, key=key_text(path), text=text, changes=", ".join(self.changes.values()))
+            return Finding(line=0, key=key_text(self.source(path)), text=text, changes=set_here[-1])
+        key = key_text(self.source(path))
+        return Finding(line=line, key=key, text=text, changes=", ".join(self.changes.values()))
+
+    def source(self, path: KeyPath) -> KeyPath:
+        """Where the value at a key path stands in the file."""
+        known = next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.sources), None)
+        return path if known is None else (*self.sources[known], *path[len(known) :])
 
     def lines(self) -> dict[str, int]:
         """Line of each value by key path as text."""

@@ -59,6 +59,14 @@ class SeamAngles:
     work: float = 0.0  # work angle in [rad] from the perpendicular to this wall towards the open side
     travel: float = 0.0  # travel angle in [rad] from the perpendicular to the seam: positive to push, negative to drag
     standoff: float = 0.0  # distance in [m] of the tip from the seam, against the axis of the tool
+    side: float = 0.0  # distance in [m] of a pass from the seam across the weld face, towards a wall
+    out: float = 0.0  # distance in [m] of a pass from the seam, out of the part between the walls
+    toward: str | None = None  # name of that wall; None for the other one than ``face``
+
+    @property
+    def is_beside(self) -> bool:
+        """Whether the tip is beside the seam."""
+        return any((self.standoff, self.side, self.out))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +97,27 @@ def tool_axes(line: SeamLine, angles: SeamAngles) -> Array:
 def tool_targets(line: SeamLine, angles: SeamAngles) -> tuple[Array, Array]:
     """Tool tips in [m] and unit tool axes into the part at each point of a seam, shape (N, 3) each, expressed in P."""
     axes = tool_axes(line, angles)
-    return line.points - angles.standoff * axes, axes
+    out, aside = weld_face(line, angles)
+    return line.points - angles.standoff * axes + angles.out * out + angles.side * aside, axes
+
+
+def weld_face(line: SeamLine, angles: SeamAngles) -> tuple[Array, Array]:
+    """Directions of passes at each point of a seam: out between the walls, and across the weld face.
+
+    Across is towards the wall that the angles name; beside one wall, or two that face alike, it is to the left of
+    travel, seen from outside.
+
+    Returns:
+        Unit vectors, shape (N, 3) each, expressed in P.
+    """
+    t, names = line.tangents, [*line.walls]
+    out = _across(sum((_across(line.walls[name], t) for name in names), np.zeros_like(t)), t)
+    left = cross(out, t)
+    toward = angles.toward or next((name for name in names if name != angles.face), None)
+    if toward is None:
+        return out, left
+    into = -np.sum(_across(line.walls[toward], t) * left, axis=1, keepdims=True)
+    return out, np.where(into < -FACE_ALIKE, -left, left)
 
 
 def _across(vectors: Array, t: Array) -> Array:

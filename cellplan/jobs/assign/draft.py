@@ -10,6 +10,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.files.cell.changes import changed
+from cellplan.files.cell.expansion import expanded
 from cellplan.files.cell.load import CellFile, load_open_cell
 from cellplan.files.cell.open_tasks import open_tasks
 from cellplan.files.yaml.reader import read_yaml
@@ -99,7 +100,7 @@ class AssignmentDraft:
     def with_robot(self, name: str) -> "AssignmentDraft":
         """The draft if a robot were available: its tasks are its alone, and open ones are open to it too."""
         changes = self.cell.origin.source.changes if isinstance(self.cell.origin.source, CellFile) else {}
-        root = changed(read_yaml(self.file, file=str(self.file)), changes).root
+        root = changed(expanded(read_yaml(self.file, file=str(self.file))), changes).root
         robot = {**root["robots"][name], "available": True}
         opened = open_tasks({**root, "robots": {**root["robots"], name: robot}})
         robots = {task: opened.get(task, (name,)) for task in self.robots}

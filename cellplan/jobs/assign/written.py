@@ -87,6 +87,8 @@ def backwards_values(cell: Cell, task: str) -> dict[str, object] | None:
     points = written_points(cell, task)
     if points is None:
         return None
+    if cell.task(task).seam is not None or cell.task(task).stretch is not None:
+        return _reversed_seam(cell, task)
     place, at = f"tasks.{task}", np.array(points, dtype=float)
     values: dict[str, object] = {f"{place}.path.polyline.points_mm": points[::-1]}
     document: Any = cell.origin.document["tasks"]
@@ -104,6 +106,23 @@ def backwards_values(cell: Cell, task: str) -> dict[str, object] | None:
     return values | {f"{place}.tool_axis": [float(it) for it in np.round(mirrored, 9) + 0.0]}
 
 
+def _reversed_seam(cell: Cell, task: str) -> dict[str, object]:
+    """Values with which a path with walls, or a part of a path, is run along the other way; what is left is right then.
+
+    Beside two walls angles and passes stay where they are.
+    """
+    document: Any = cell.origin.document["tasks"]
+    path, place = document[task]["path"], f"tasks.{task}.path"
+    values: dict[str, object] = {f"{place}.reverse": not path.get("reverse", False)}
+    seam, weave = cell.task(task).seam, path.get("weave") or {}
+    if seam is not None and len(seam.walls) == 1:
+        values |= {f"{place}.{key}": -path[key] for key in ("work_deg", "side_mm") if path.get(key)}
+    if weave.get("dwell_left_s") != weave.get("dwell_right_s"):
+        sides = ("dwell_left_s", "dwell_right_s")
+        values |= {f"{place}.weave.{key}": weave[other] for key, other in zip(sides, sides[::-1], strict=True)}
+    return values
+
+
 def goals_written_otherwise(draft: AssignmentDraft, goals: Sequence[TaskGoal]) -> list[TaskGoal]:
     """The same tasks as a cell file may also have them: done backwards with a mirrored tool, or begun elsewhere."""
     return [*mirrored_goals(draft, goals), *goals_with_other_starts(draft, goals)]
@@ -118,7 +137,9 @@ def mirrored_goals(draft: AssignmentDraft, goals: Sequence[TaskGoal]) -> list[Ta
     if not values:
         return []
     back = {goal.name: goal.X_PT[::-1] for goal in task_goals(cell.with_values(values), draft.robots)}
-    turned = [goal for goal in goals if f"tasks.{goal.name}.tool_axis" in values]
+    turned = [
+        goal for goal in goals if values.keys() & {f"tasks.{goal.name}.tool_axis", f"tasks.{goal.name}.path.reverse"}
+    ]
     return [replace(goal, X_PT=back[goal.name], is_mirrored=True) for goal in turned]
 
 
@@ -152,6 +173,8 @@ def _starts(cell: Cell, task: str) -> list[tuple[str, object]]:
     tasks: Any = cell.origin.document["tasks"]
     path, place = tasks[task]["path"], f"tasks.{task}.path"
     points = written_points(cell, task)
+    if cell.task(task).stretch is not None:
+        return []
     if points is not None and path["polyline"].get("closed") and cell.task(task).blend is None:
         step = -(-len(points) // len(ANGLES))  # no more starts than a circle has
         turned = ((*points[first:], *points[:first]) for first in range(step, len(points), step))
@@ -163,10 +186,10 @@ def _starts(cell: Cell, task: str) -> list[tuple[str, object]]:
 
 
 def written_points(cell: Cell, task: str) -> tuple[object, ...] | None:
-    """Points of the path of a task as they stand in the file; None where it is no polyline."""
+    """Points of the path of a task as they stand in the file; None where it is no polyline, or goes back at its end."""
     tasks: Any = cell.origin.document["tasks"]
-    polyline = tasks[task]["path"].get("polyline")
-    return None if polyline is None else tuple(polyline["points_mm"])
+    path = tasks[task]["path"]
+    return tuple(path["polyline"]["points_mm"]) if path.get("polyline") and "back_mm" not in path else None
 
 
 def _configuration(address: str, model: RobotModel, q: Array) -> dict[str, object]:

@@ -30,6 +30,17 @@ class Seam:
     angles: SeamAngles
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """The part of a path that a task runs along: lengths in [m] along the path as it is drawn."""
+
+    begin: float = 0.0  # length before it
+    end: float | None = None  # length at its end; None for that of the path
+    is_reversed: bool = False  # whether it is run along from its end to its begin
+    overlap: float = 0.0  # length by which it goes on past the start of a closed path
+    back: float = 0.0  # length by which the tool goes back at the end, held as it came
+
+
 class WeaveForm(StrEnum):
     """Line of a weave."""
 

@@ -10,7 +10,7 @@ from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.geometry.transforms import Array
 from cellplan.model.origin import Origin
 from cellplan.model.settings.task import ProcessEntry, ToleranceEntry, TorchEntry, WeldPositionEntry
-from cellplan.model.task.seam import Seam, Weave
+from cellplan.model.task.seam import Seam, Stretch, Weave
 
 TIME_TOLERANCE: Final = 1e-9  # [s] times nearer than this are the same: rounding of sums of durations
 
@@ -174,6 +174,7 @@ class Task:
         robot: Name of the operator.
         path: The path as written.
         seam: Walls beside the path, and how the tool is held to them; None where ``tool_axis`` or a file says so.
+        stretch: The part of the path that is run along; None for all of it.
         weave: How the tip swings about its path; None where it does not, or where the controller weaves.
         project: Unit direction in P naming the side of the part onto which the path is projected (the outward normal
             there), shape (3,); None when the path is used at its place.
@@ -225,6 +226,7 @@ class Task:
     robot: str
     path: PathSpec
     seam: Seam | None = None
+    stretch: Stretch | None = None
     weave: Weave | None = None
     project: Array | None = None
     plane_offset: float = 0.0

@@ -15,16 +15,19 @@ from cellplan.geometry.curves.orientation import (
     SpunFrame,
     rotations_through,
 )
+from cellplan.geometry.curves.rerun import RerunFrame
 from cellplan.geometry.curves.spline import spline_through
 from cellplan.geometry.shapes import bounding_box
 from cellplan.geometry.transforms import Array, frame_from_axes, inverse, is_rigid, pose_from, rotation_vector
 from cellplan.model.cell.cell import Part
+from cellplan.model.task.seam import Stretch
 from cellplan.model.task.task import Frame, SampledPath, Task, TimedPath
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.path.curve import PathCurve, path_curve
 from cellplan.planning.path.formatting import MM, direction_name, in_mm, length
 from cellplan.planning.path.projection import along, project_path
 from cellplan.planning.path.seam import follow_seam
+from cellplan.planning.path.stretch import along_stretches, back_at_end, stretch_of
 from cellplan.planning.path.weave import woven_path
 
 STANDSTILL: Final = 1e-4  # [-] of the largest speed by the parameter: a curve slower than this has a cusp there
@@ -84,12 +87,19 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
 
 
 def _with_tool(task: Task, path: PathCurve) -> tuple[PathCurve, Orientation]:
-    """The curve of the tip, and the orientation of the tool along it."""
+    """The curve of the tip along its stretch of a path, and the orientation of the tool along it."""
+    stretch = task.stretch or Stretch()
+    rerun = None if stretch == Stretch(back=stretch.back) else stretch_of(path, stretch, task)
     if task.seam is None:
-        curve, orientation = path, orient_tool(task, path)
+        orientation = orient_tool(task, path)
+        curve = path if rerun is None else along_stretches(path, rerun)
+        orientation = orientation if rerun is None else RerunFrame(frame=orientation, rerun=rerun)
     else:
-        curve, axes = follow_seam(task, path, task.seam.angles)
+        curve, axes = follow_seam(task, path if rerun is None else along_stretches(path, rerun), task.seam.angles)
         orientation = _by_axes(axes, task, curve)
+    if stretch.back:
+        back = back_at_end(curve, stretch.back, task)
+        curve, orientation = along_stretches(curve, back), RerunFrame(frame=orientation, rerun=back)
     return curve, SpunFrame(frame=orientation, angle=task.spin) if task.spin else orientation
 
 

@@ -58,7 +58,7 @@ class PathCurve:
     is_closed: bool  # whether the end is the start
     runs_on: bool = False  # whether a closed curve passes its start without a corner
     patch: Patch | None = None  # the smooth patch of the part under it; None on a mesh or where it is not projected
-    inward: BezierCurve | None = None  # inward normals of a mesh along the curve; None elsewhere
+    inward: Curve | None = None  # inward normals of a mesh along the curve; None elsewhere
     walls: Mapping[str, Curve] = field(
         default_factory=dict
     )  # outward normals of walls that a seam line states, by name

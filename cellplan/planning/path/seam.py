@@ -7,8 +7,8 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
-from cellplan.geometry.curves.curve import Curve, Interval, by_differences, cubic_fit
-from cellplan.geometry.curves.seam_line import SeamAngles, SeamLine, tool_axes
+from cellplan.geometry.curves.curve import Interval, by_differences, cubic_fit
+from cellplan.geometry.curves.seam_line import SeamAngles, SeamLine, tool_axes, tool_targets
 from cellplan.geometry.transforms import cross
 from cellplan.model.task.seam import WallPlace
 from cellplan.model.task.task import Task
@@ -50,7 +50,8 @@ class SeamAxes:
         upright: dict[str, float] = {}
         for name, wall in self.task.seam.walls.items() if self.task.seam else ():
             if isinstance(wall, WallPlace) and wall is not WallPlace.SURFACE:
-                upright[name] = -1.0 if wall is WallPlace.LEFT else 1.0
+                side = -1.0 if self.task.stretch and self.task.stretch.is_reversed else 1.0
+                upright[name] = -side if wall is WallPlace.LEFT else side
             elif isinstance(wall, WallPlace):
                 walls[name] = self._surface(p, u, interval)
             else:
@@ -71,23 +72,24 @@ class SeamAxes:
         return -_normals(self.curve.inward.evaluate(u, interval)[0])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _OffsetCurve:
-    """A curve with its points moved by a distance in [m] along moving axes."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _TipCurve:
+    """Tips beside a seam; see `cellplan.geometry.curves.curve.Curve`."""
 
-    curve: Curve
-    axes: Curve
-    distance: float
+    axes: SeamAxes
 
     @property
     def knots(self) -> Array:
-        """Those of the curve."""
-        return self.curve.knots
+        """Those of the seam."""
+        return self.axes.knots
 
     def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:
-        """Points and derivatives, see `cellplan.geometry.curves.curve.Curve`."""
-        (p, dp), (a, da) = self.curve.evaluate(u, interval), self.axes.evaluate(u, interval)
-        return p + self.distance * a, dp + self.distance * da
+        """Points and derivatives."""
+        return by_differences(self._tips, self.knots, u, interval)
+
+    def _tips(self, u: Array, interval: Interval) -> Array:
+        """Points alone."""
+        return tool_targets(self.axes.line(u, interval), self.axes.angles)[0]
 
 
 def follow_seam(task: Task, curve: PathCurve, angles: SeamAngles) -> tuple[PathCurve, SeamAxes]:
@@ -99,10 +101,7 @@ def follow_seam(task: Task, curve: PathCurve, angles: SeamAngles) -> tuple[PathC
     axes = SeamAxes(curve=curve, task=task, angles=angles)
     _refuse_steep_walls(task, axes)
     _refuse_jumps(task, axes)
-    if not angles.standoff:
-        return curve, axes
-    offset = _OffsetCurve(curve=curve.curve, axes=axes, distance=-angles.standoff)
-    return replace(curve, curve=cubic_fit(offset, tolerance=FIT)), axes
+    return (replace(curve, curve=cubic_fit(_TipCurve(axes), tolerance=FIT)) if angles.is_beside else curve), axes
 
 
 def _normals(vectors: Array) -> Array:

@@ -8,7 +8,7 @@ import pytest
 from cellplan.geometry.transforms import inverse
 from cellplan.jobs.assign.assign import assign
 from cellplan.jobs.assign.draft import AssignmentDraft
-from cellplan.jobs.assign.written import goals_with_other_starts
+from cellplan.jobs.assign.written import backwards_values, goals_with_other_starts
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.search.assign.problem.goals import Stations, TaskGoal, task_goals
 
@@ -99,3 +99,43 @@ def test_a_program_with_a_ring_passes_and_has_its_start(tmp_path: Path) -> None:
     )
     part = Stations.of(cell, work.motion.q[row : row + 1, cell.columns("table")]).X_WP
     assert np.abs((inverse(part) @ tool)[0, :2, 3] - CENTRE[:2] - 0.06 * at).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("keys", "is_mirrored"),
+    [
+        ("walls: {web: -y, floor: +z}, from: floor, work_deg: 45", False),
+        ("walls: {web: -y, floor: +z}, from: floor, work_deg: 45, drag_deg: 10, from_mm: 20, to_mm: 90", True),
+        ("walls: {floor: +z}, work_deg: 20, push_deg: 10, side_mm: 3", True),
+    ],
+)
+def test_a_seam_that_is_done_backwards_has_its_axes_and_its_travel_angle(
+    tmp_path: Path, keys: str, is_mirrored: bool
+) -> None:
+    line = LINE.replace("}}", f"}}, {keys}}}")
+    cell = draft(tmp_path, line, ("    tool_axis: [0, 0, -1]\n", "")).cell
+    values = backwards_values(cell, "top_1")
+    assert values is not None
+    there, back = (task_goals(it, {})[0].X_PT[1:-1] for it in (cell, cell.with_values(values)))
+
+    assert np.abs(back[::-1, :3, 3] - there[:, :3, 3]).max() < 1e-9
+    along = there[-1, :3, 3] - there[0, :3, 3]
+    along /= np.linalg.norm(along)
+    mirrored = there[:, :3, 2] - 2.0 * (there[:, :3, 2] @ along)[:, None] * along
+    assert np.abs(back[::-1, :3, 2] - mirrored).max() < 1e-9
+    assert bool(np.abs(mirrored - there[:, :3, 2]).max() > 1e-3) is is_mirrored
+
+
+@pytest.mark.slow
+def test_passes_of_an_open_seam_are_done_by_one_robot_in_their_order(tmp_path: Path) -> None:
+    passes = "    passes: [{work_deg: 0}, {side_mm: 3, out_mm: 2}, {side_mm: -3, out_mm: 2, reverse: true}]\n"
+    seam = LINE.replace("}}", "}, walls: {plate: +z}}")
+    rule = ("program: {}", "program: {same_robot: [top_1, top_2]}")
+    given = draft(tmp_path, seam, ("    tool_axis: [0, 0, -1]\n", passes), rule)
+
+    assignment = assign(given, effort=1)
+
+    assert assignment.passed
+    tasks = [assignment.cell.task(f"top_1_{k}") for k in (1, 2, 3)]
+    assert len({task.robot for task in tasks}) == 1
+    assert [task.after[0] for task in tasks[1:]] == ["top_1_1", "top_1_2"]

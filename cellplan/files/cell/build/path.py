@@ -13,8 +13,8 @@ from cellplan.files.schema.task import TaskEntry
 from cellplan.files.shapes import direction
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.curves.seam_line import SeamAngles
-from cellplan.model.settings.units import Deg, Mm
-from cellplan.model.task.seam import Seam, WallPlace, Weave, WeaveForm
+from cellplan.model.settings.units import Deg, Mm, si_or_none
+from cellplan.model.task.seam import Seam, Stretch, WallPlace, Weave, WeaveForm
 from cellplan.model.task.task import (
     CirclePath,
     PathSpec,
@@ -34,6 +34,7 @@ class PathFields(TypedDict):
 
     path: PathSpec
     seam: Seam | None
+    stretch: Stretch | None
     weave: Weave | None
     project: Array | None
     plane_offset: float
@@ -46,6 +47,7 @@ def path_fields(name: str, document: CellDocument, read_targets: TargetReader) -
     return PathFields(
         path=_path(name, entry, read_targets),
         seam=_seam(entry),
+        stretch=_stretch(entry),
         weave=None if entry.weave is None or is_woven_by_controller(task, document) else _weave(entry.weave, task),
         project=None if entry.project is None else direction(entry.project),
         plane_offset=(entry.offset_mm or Mm(0.0)).si,
@@ -118,8 +120,23 @@ def _seam(entry: PathEntry) -> Seam | None:
             work=(entry.work_deg or Deg(0.0)).si,
             travel=(entry.push_deg or Deg(0.0)).si - (entry.drag_deg or Deg(0.0)).si,
             standoff=(entry.standoff_mm or Mm(0.0)).si,
+            side=(entry.side_mm or Mm(0.0)).si,
+            out=(entry.out_mm or Mm(0.0)).si,
+            toward=entry.toward,
         ),
     )
+
+
+def _stretch(entry: PathEntry) -> Stretch | None:
+    """The part of a path that is run along; None for all of it."""
+    stretch = Stretch(
+        begin=(entry.from_mm or Mm(0.0)).si,
+        end=si_or_none(entry.to_mm),
+        is_reversed=bool(entry.reverse),
+        overlap=(entry.overlap_mm or Mm(0.0)).si,
+        back=(entry.back_mm or Mm(0.0)).si,
+    )
+    return None if stretch == Stretch() else stretch
 
 
 def is_woven_by_controller(task: TaskEntry, document: CellDocument) -> bool:

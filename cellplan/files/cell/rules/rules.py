@@ -18,6 +18,22 @@ AT_REST: Final = frozenset({"part_at_rest", "semi_coordinated"})  # modes in whi
 Targets = Mapping[str, SampledPath | TimedPath]  # what was read of the files of paths, by task
 CLOCK_KEYS: Final = ("duration_s", "feed_mm_s", "process", "time_law", "corners")  # what a trajectory decides by itself
 
+OF_LENGTH: Final = (
+    "walls",
+    "work_deg",
+    "push_deg",
+    "drag_deg",
+    "standoff_mm",
+    "side_mm",
+    "out_mm",
+    "from_mm",
+    "to_mm",
+    "reverse",
+    "overlap_mm",
+    "back_mm",
+    "weave",
+)  # keys of a path that are about its travel, which a trajectory brings along
+
 
 def rule_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """Everything in a cell file that contradicts something else in it."""
@@ -186,6 +202,10 @@ def _clock(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Findi
     if task.path.project is not None:
         text = "unexpected key, a path with a column t_s is used as it stands in the file"
         yield document.key_finding(("tasks", name, "path", "project"), text)
+    for key in OF_LENGTH:
+        if getattr(task.path, key) is not None:
+            text = "unexpected key, a path with a column t_s is used as it stands in the file"
+            yield document.key_finding(("tasks", name, "path", key), text)
     if isinstance(task.path.csv, CsvEntry) and not task.path.csv.smooth:
         text = "expected true for a file with a column t_s: straight sides would jump in speed, got false"
         yield document.finding(("tasks", name, "path", "csv", "smooth"), text)
