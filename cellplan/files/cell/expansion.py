@@ -145,7 +145,7 @@ def _stretch(name: str, plain: Mapping[str, Any], span: tuple[float, float], sou
 def _spans(path: Any, entry: StitchEntry | TacksEntry, pitch: float) -> Sequence[tuple[float, float]]:
     """Begins and ends of stitches or tacks in [mm] along the path, in the order in which it is run along."""
     begin = float(path.from_mm or 0.0)
-    end = float(path.to_mm) if path.to_mm is not None else drawn_length(path)
+    end = float(path.to_mm) if path.to_mm is not None else stated_length(path)
     count = entry.count
     if count is None and end is not None:
         count = floor((end - begin - entry.length_mm) / pitch + ROUNDING) + 1
@@ -156,7 +156,7 @@ def _spans(path: Any, entry: StitchEntry | TacksEntry, pitch: float) -> Sequence
     return spans[::-1] if path.reverse else spans
 
 
-def drawn_length(path: PathShapeEntry) -> float | None:
+def stated_length(path: PathShapeEntry) -> float | None:
     """Length in [mm] of a path as it is drawn, before it is projected or rounded; None of one from a file."""
     if path.circle is not None:
         return 2.0 * pi * path.circle.radius_mm

@@ -64,7 +64,7 @@ class SeamAngles:
     toward: str | None = None  # name of that wall; None for the other one than ``face``
 
     @property
-    def is_beside(self) -> bool:
+    def is_offset(self) -> bool:
         """Whether the tip is beside the seam."""
         return any((self.standoff, self.side, self.out))
 
@@ -97,8 +97,8 @@ def tool_axes(line: SeamLine, angles: SeamAngles) -> Array:
 def tool_targets(line: SeamLine, angles: SeamAngles) -> tuple[Array, Array]:
     """Tool tips in [m] and unit tool axes into the part at each point of a seam, shape (N, 3) each, expressed in P."""
     axes = tool_axes(line, angles)
-    out, aside = weld_face(line, angles)
-    return line.points - angles.standoff * axes + angles.out * out + angles.side * aside, axes
+    out, lateral = weld_face(line, angles)
+    return line.points - angles.standoff * axes + angles.out * out + angles.side * lateral, axes
 
 
 def weld_face(line: SeamLine, angles: SeamAngles) -> tuple[Array, Array]:
