@@ -2,13 +2,14 @@
 
 In each round the block model chooses who does which tasks together, the sequencer orders the blocks and chooses the
 modes, and the transfers are certified; the program is then solved as any other. Blocks that fail a check are not chosen
-again.
+again; where no program passes, the one with fewest failed checks is the result, of equal ones the first.
 """
 
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from math import inf
 from typing import Final, TypedDict
 
 from cellplan.errors import ImpossibleTasksError, NoSolutionError
@@ -183,34 +184,34 @@ def _program_of(search: AssignmentSearch, progress: Progress) -> Assignment:
     """The program of all tasks of a draft."""
     draft = search.draft
     instance = search.instance(progress)
-    counts, plans = search.counts, list[PlannedBlocks]()
+    counts, trials = search.counts, list[_Trial]()
     for number in range(1, ROUNDS + 1):
         progress("blocks", (number - 1) / ROUNDS)
-        plans.append(search.planned(instance, is_first=number == 1))
-        cell = written_cell(draft, instance, plans[-1].sequenced)
-        solution, failure = _tried(cell, search.answers, progress)
-        if failure is None or number == ROUNDS:
+        plan = search.planned(instance, is_first=number == 1)
+        trials.append(_tried(written_cell(draft, instance, plan.sequenced), instance, plan, search.answers, progress))
+        best = min(trials, key=lambda it: it.failed)
+        trials = [it if it is best else replace(it, solution=None) for it in trials]
+        if (failure := trials[-1].failure) is None:
             break
-        instance = without_failed(instance, plans[-1].sequenced, failure)
-    if failure is not None and failure["reason"]:
+        instance = without_failed(instance, plan.sequenced, failure)
+    if best.failure is not None and best.failure["reason"]:
         where = draft.cell.origin.at("tasks")
-        raise NoSolutionError(f"{where}: no program passed in {ROUNDS} rounds; the last one: {failure['reason']}")
-    first, planned = plans[0], plans[-1]
+        raise NoSolutionError(f"{where}: no program passed in {ROUNDS} rounds; the first one: {best.failure['reason']}")
+    first, step = trials[0].plan, instance.step
     steps = None if has_open_rests(draft.cell, instance) else first.bound
-    without = {name: None if it is None else it.steps * instance.step for name, it in first.without.items()}
     return Assignment(
         draft=draft.cell,
-        cell=cell,
-        solution=solution or solve(cell, progress=progress),
-        instance=instance,
-        sequenced=planned.sequenced,
-        bound=None if steps is None else steps * instance.step,
+        cell=best.cell,
+        solution=best.solution or solve(best.cell, progress=progress),
+        instance=best.instance,
+        sequenced=best.plan.sequenced,
+        bound=None if steps is None else steps * step,
         is_proved=first.is_proved,
-        greedy=planned.greedy * instance.step,
-        alternatives=alternatives_to(planned.sequenced, first.others),
-        without=without,
-        rounds=len(plans),
-        counts=counts | {"certificates": planned.examined, "refused": planned.refused},
+        greedy=best.plan.greedy * step,
+        alternatives=alternatives_to(best.plan.sequenced, first.others),
+        without={name: None if it is None else it.steps * step for name, it in first.without.items()},
+        rounds=len(trials),
+        counts=counts | {"certificates": plan.examined, "refused": plan.refused},
     )
 
 
@@ -233,10 +234,29 @@ class Failure(TypedDict):
 
     reason: str  # why there is none; empty where there is one
     blocks: list[int]  # places of the blocks that failed a check
+    checks: int  # number of checks that failed
     short_s: float  # longest time by which the part cooled too shortly
 
 
-def _tried(cell: Cell, answers: Answers, progress: Progress) -> tuple[Solution | None, Failure | None]:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Trial:
+    """A program that was solved in one round."""
+
+    instance: Instance
+    plan: PlannedBlocks
+    cell: Cell
+    solution: Solution | None  # None where it is only known why it failed, or that it passed
+    failure: Failure | None
+
+    @property
+    def failed(self) -> float:
+        """Number of checks that failed; none is the best, no program the worst."""
+        if self.failure is None:
+            return 0.0
+        return inf if self.failure["reason"] else self.failure["checks"]
+
+
+def _tried(cell: Cell, instance: Instance, plan: PlannedBlocks, answers: Answers, progress: Progress) -> _Trial:
     """A program, solved and verified, and why it did not pass; no solution where that was recorded."""
     solutions = list[Solution]()
 
@@ -244,11 +264,12 @@ def _tried(cell: Cell, answers: Answers, progress: Progress) -> tuple[Solution |
         try:
             solutions.append(solve(cell, progress=progress))
         except NoSolutionError as error:
-            return Failure(reason=str(error), blocks=[], short_s=0.0)
+            return Failure(reason=str(error), blocks=[], checks=0, short_s=0.0)
         return failure_of(solutions[0])
 
     failure: Failure | None = answers("program", str(cell.origin.document), solved)
-    return next(iter(solutions), None), failure
+    solution = next(iter(solutions), None)
+    return _Trial(instance=instance, plan=plan, cell=cell, solution=solution, failure=failure)
 
 
 def failure_of(solution: Solution) -> Failure | None:
@@ -259,6 +280,7 @@ def failure_of(solution: Solution) -> Failure | None:
     works = [run for run in solution.runs if run.schedule.tasks]
     return Failure(
         reason="",
+        checks=len(checks),
         blocks=[place for place, run in enumerate(works) if not all(check.passed for check in run.report.checks)],
         short_s=max((check.limit - check.value for check in checks if check.name == "rest"), default=0.0),
     )

@@ -218,7 +218,7 @@ def assign_lines(record: Record) -> list[str]:
     binding, only = record["binding"], record["only_one_robot"]
     bound = f"  {record['bound_holds_for']}"
     if record["bound_s"] is not None:
-        above = f"the program is {record['gap_percent']:.2g} % above it"
+        above = f"the program is {record['gap_percent']:.3g} % above it"
         bound = f"  lower bound {record['bound_s']:g} s, of {record['bound_holds_for']}; {above}"
     lines = [
         f"{record['cell']}: {record['status']}, {record['cycle_time_s']:g} s",

@@ -151,7 +151,7 @@ def test_blocks_with_a_moving_part_are_not_planned_again(tmp_path: Path, monkeyp
 
 @pytest.mark.slow
 def test_programs_that_failed_are_not_solved_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In rows as coarse as these a torch leaves its path in every round: the last program alone has a report."""
+    """In rows as coarse as these torches leave their paths in every round: the first program, the shortest, stays."""
     draft = AssignmentDraft.load(OPEN, settings=[*FEW.replace("--set ", "").split(), "motion.step_s=0.05"])
     recorded = list[object]()
 
@@ -161,6 +161,7 @@ def test_programs_that_failed_are_not_solved_again(monkeypatch: pytest.MonkeyPat
 
     first = assign(draft, effort=1, answers=record)
     assert (first.passed, first.rounds) == (False, ROUNDS)
+    assert [*map(set, first.sequenced.schedule.blocks)] == [{"top_1", "top_2"}]
     solved, answers = list[Cell](), iter(recorded)
 
     def counted(cell: Cell, **options: Progress) -> Solution:

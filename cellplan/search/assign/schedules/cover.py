@@ -7,12 +7,13 @@ from the last one; half of either counts for each block, up to a limit :math:`\k
     + \sum_{\text{moves of the part}} \max(t - \kappa, 0)
 
 where the blocks chosen have all tasks. The linear relaxation is solved for all blocks, the whole problem for those of
-the least reduced costs. Rules between tasks are left out, which keeps the bound a bound.
+the least reduced costs. Of the rules between tasks those count that decide what a block may have; the others are left
+out, which keeps the bound a bound.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice, permutations, product
+from itertools import combinations, islice, permutations, product
 from typing import Any, Final, Self
 
 import numpy as np
@@ -73,23 +74,40 @@ def bound_of_blocks(instance: Instance, *, least: int, effort: float, hint: Bloc
 
 
 def possible_blocks(instance: Instance) -> Iterator[frozenset[Key]]:
-    """Tasks of robots that can begin together, at each station; of a column all of them."""
+    """Tasks of robots that can begin together, at each station; of a column and of tasks by rule together all."""
+    apart = tasks_apart(instance)
     for station in instance.used:
         if station in instance.columns:
             yield instance.columns[station]
             continue
         keys = [key for key in instance.modes if key[2] == station]
-        fits = {a: [b for b in keys[place + 1 :] if _fit(instance, a, b)] for place, a in enumerate(keys)}
+        fits = {a: [b for b in keys[place + 1 :] if _fit(instance, apart, a, b)] for place, a in enumerate(keys)}
         left: list[tuple[tuple[Key, ...], list[Key]]] = [((key,), fits[key]) for key in reversed(keys)]
         while left:
             block, others = left.pop()
-            yield frozenset(block)
+            tasks = {key[0] for key in block}
+            if all(tasks.isdisjoint(group) or tasks.issuperset(group) for group in instance.rules.together):
+                yield frozenset(block)
             left += [((*block, key), [it for it in fits[key] if it in others]) for key in reversed(others)]
 
 
-def _fit(instance: Instance, first: Key, second: Key) -> bool:
+def tasks_apart(instance: Instance) -> frozenset[frozenset[str]]:
+    """Pairs of tasks that never begin together: one comes after the other, or one robot does both."""
+    pairs = {frozenset(pair) for group in instance.rules.same_robot for pair in combinations(group, 2)}
+    for task in instance.tasks:
+        left, before = [task], set[str]()
+        while left:
+            more = set(instance.goals[left.pop()].after) & set(instance.goals) - before
+            before |= more
+            left += more
+        pairs |= {frozenset((task, first)) for first in before}
+    return frozenset(pairs)
+
+
+def _fit(instance: Instance, apart: Collection[frozenset[str]], first: Key, second: Key) -> bool:
     """Whether two tasks of robots can begin together."""
-    return first[0] != second[0] and first[1] != second[1] and frozenset((first, second)) not in instance.conflicts
+    is_apart = first[0] == second[0] or frozenset((first[0], second[0])) in apart
+    return not is_apart and first[1] != second[1] and frozenset((first, second)) not in instance.conflicts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -167,9 +185,9 @@ class _Cover:
 
     @classmethod
     def relaxed_of(cls, instance: Instance) -> tuple[Self, Relaxed] | None:
-        """All possible blocks with the limit that makes the largest bound; None where there are too many."""
+        """All possible blocks with the limit that makes the largest bound; None where there are too many or too few."""
         blocks = list(islice(possible_blocks(instance), MOST_BLOCKS + 1))
-        if len(blocks) > MOST_BLOCKS:
+        if len(blocks) > MOST_BLOCKS or len({task for it in blocks for task, _, _ in it}) < len(instance.tasks):
             return None
         moves = least_moves(instance)
         limits = np.unique(np.quantile(moves.of(blocks, FAR)[0], LIMITS).astype(np.int64) // 2).tolist()

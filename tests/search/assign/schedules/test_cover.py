@@ -1,5 +1,6 @@
 """The choice from all blocks by enumeration of every program: schedules, orders of blocks and ways to do the tasks."""
 
+from dataclasses import replace
 from itertools import combinations, permutations, product
 from typing import Any
 
@@ -8,9 +9,10 @@ from builders.assignments import small_instance
 from search.assign.schedules.test_blocks import RULES, partitions
 
 from cellplan.search.assign.problem.instance import Instance, least_transfer
+from cellplan.search.assign.problem.rules import TaskRules
 from cellplan.search.assign.schedules import cover
 from cellplan.search.assign.schedules.blocks import solve_blocks
-from cellplan.search.assign.schedules.cover import best_blocks, cover_blocks, possible_blocks
+from cellplan.search.assign.schedules.cover import best_blocks, bound_of_blocks, cover_blocks, possible_blocks
 from cellplan.search.assign.schedules.greedy import greedy_schedule
 from cellplan.search.assign.schedules.order import Sequencer
 from cellplan.search.assign.schedules.schedule import BlockSchedule, in_order, refuse_impossible
@@ -90,6 +92,37 @@ def test_all_blocks_are_listed_once(seed: int) -> None:
 
     assert len(set(blocks)) == len(blocks)
     assert set(blocks) == {*single, *pairs, *instance.columns.values()}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_tasks_in_order_and_of_one_robot_share_no_block_and_those_together_all_do(seed: int) -> None:
+    rules = TaskRules(same_robot=(("t3", "t4"),), together=(("t0", "t5"),))
+    instance = small_instance(seed, 6, chained=True, rules=rules)  # t2 comes after t0, and t1 after t2
+
+    blocks = [{task for task, _, _ in block} for block in possible_blocks(instance)]
+
+    assert not any(
+        {"t1", "t2"} <= it or {"t0", "t1"} <= it or {"t0", "t2"} <= it or {"t3", "t4"} <= it for it in blocks
+    )
+    assert all(("t0" in it) == ("t5" in it) for it in blocks)
+    assert {"t1", "t2", "t3", "t4"} <= set().union(*blocks)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_program_of_tasks_one_after_the_other_is_shorter_than_all_of_them(seed: int) -> None:
+    pytest.importorskip("ortools")
+    instance = small_instance(seed, 5)
+    names = instance.tasks
+    in_turn = {
+        name: replace(goal, after=names[:place][-1:]) for place, (name, goal) in enumerate(instance.goals.items())
+    }
+    instance = replace(instance, goals=in_turn)
+
+    bound = bound_of_blocks(instance, least=0, effort=1.0)
+
+    assert bound is not None
+    assert bound >= sum(map(instance.steps, names))
+    assert bound <= (shortest_program(instance) or bound)
 
 
 @pytest.mark.parametrize("most", [1, 3, 10])
