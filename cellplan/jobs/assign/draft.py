@@ -135,6 +135,9 @@ class AssignmentDraft:
             InputError: A station has other joints than the holder, or there are too many.
         """
         if not self.cell.positioners:
+            if self.settings.stations is not None:
+                where = self.cell.origin.at("assign.stations")
+                raise InputError(f"{where}: unexpected key, no robot holds the part: remove it")
             return Stations.of(self.cell, np.zeros((1, 0)))
         holder, written = self.cell.robot(self.cell.positioners[0]), self.settings.stations
         where, is_free = self.cell.origin.at("assign.stations"), "station" in self.settings.free

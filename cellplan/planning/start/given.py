@@ -27,8 +27,15 @@ def start_place(cell: Cell, robot: Robot) -> str:
     """Where a robot's start posture stands in the cell file, or would stand."""
     if robot.path is not None:
         return cell.origin.at(f"robots.{robot.name}.path")
-    by_joint, as_list = f"robots.{robot.name}.start", f"robots.{robot.name}.start_deg"
+    place = f"robots.{robot.name}" if (task := _task_begun(cell, robot)) is None else f"tasks.{task.name}"
+    by_joint, as_list = f"{place}.start", f"{place}.start_deg"
     return cell.origin.at(by_joint if by_joint in cell.origin.lines else as_list)
+
+
+def _task_begun(cell: Cell, robot: Robot) -> Task | None:
+    """The task whose key states the start posture of a robot; None where it is the robot's."""
+    begun = (it for it in cell.tasks if it.robot == robot.name and it.start_posture is not None)
+    return next((it for it in begun if np.array_equal(np.asarray(it.start_posture), np.asarray(robot.start))), None)
 
 
 def home_key(robot: Robot) -> str:
@@ -107,10 +114,12 @@ def off_words(cell: Cell, relation: Relation, off: tuple[float, float], *, at_be
     if isinstance(relation, Grasp):
         goal = f"its grasp on the part that '{cell.positioners[0]}' carries"
     position, orientation = _allowed(cell, relation)
+    robot = cell.robot(relation.robot)
+    cure = "`auto` finds a configuration" if _task_begun(cell, robot) is None else "without the key one is searched for"
     return (
-        f"{start_place(cell, cell.robot(relation.robot))}: the tool of '{relation.robot}' is {at_best}"
+        f"{start_place(cell, robot)}: the tool of '{relation.robot}' is {at_best}"
         f"{1e3 * off[0]:.3f} mm and {np.degrees(off[1]):.4f} deg from {goal}, allowed are {1e3 * position:g} mm and "
-        f"{np.degrees(orientation):g} deg; `auto` finds a configuration"
+        f"{np.degrees(orientation):g} deg; {cure}"
     )
 
 

@@ -65,6 +65,18 @@ def test_cells_of_which_no_assignment_is_made(tmp_path: Path, old: str, new: str
     assert words in str(refused.value)
 
 
+def test_stations_of_a_part_that_no_robot_holds_are_refused(tmp_path: Path) -> None:
+    changes = [
+        ("  held_by:\n    - {robot: table, at: {xyz_mm: [0, 0, -60]}}", "  at: {xyz_mm: [0, 0, 510]}"),
+        ("start_deg: [0, 0]", "start_deg: [0, 0]\n    home_deg: [0, 0]"),
+        ("semi_coordinated", "simultaneous"),
+    ]
+    with pytest.raises(
+        InputError, match=r"cell\.yaml:\d+: assign\.stations: unexpected key, no robot holds the part: rem"
+    ):
+        draft(tmp_path, *changes)
+
+
 def test_values_of_the_command_line_come_before_tasks_are_read_as_open(tmp_path: Path) -> None:
     settings = ("tasks.top_1.robot=east", "tasks.top_2.robot=any", "robots.west.available=false")
 

@@ -74,6 +74,16 @@ def test_start_off_the_task_is_named_with_distance_and_cure(cell):
     )
 
 
+def test_a_start_that_a_task_states_is_named_there(cell):
+    start = cell.robot("abb").start + np.radians([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    tasks = tuple(replace(it, start_posture=start) if it.name == "rhombus" else it for it in cell.tasks)
+
+    with pytest.raises(
+        StartOffTaskError, match=r": tasks\.rhombus\.start_deg: the tool of 'abb' .* without the key one"
+    ):
+        examine_given_starts(replace(with_start(cell, "abb", start), tasks=tasks), toolpaths_of(cell))
+
+
 def test_all_wrong_starts_are_named_at_once(cell):
     wrong = cell
     for name in ("kuka", "staubli"):
