@@ -50,10 +50,11 @@ from cellplan.geometry.mesh.load import require_enclosing, require_solid
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.step.part import StepPart
 from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.mirror import mirrored_part, mirrored_task
 from cellplan.model.origin import Origin
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.program import NoTransfers
-from cellplan.model.task.task import TimedPath
+from cellplan.model.task.task import PlaneName, TimedPath
 
 PART_EXTENT_MM: Final = (1.0, 20_000.0)  # smaller or larger parts are a wrong unit
 PARTS: Final = (
@@ -312,11 +313,16 @@ def _cell(
         changes=source.changes,
         changed={key_text(path): text for path, text in document.changes.items()},
     )
+    workpiece = build_part(whole, models, mesh, part)
+    tasks = [build_task(name, whole, models, targets.__getitem__, origin) for name in whole.tasks]
+    if whole.part.mirror is not None:
+        plane = PlaneName(whole.part.mirror.plane)
+        workpiece, tasks = mirrored_part(workpiece, plane), [mirrored_task(task, plane) for task in tasks]
     return Cell(
         name=whole.name,
         robots=tuple(build_robot(name, whole, models[name], mesh) for name in whole.robots),
-        part=build_part(whole, models, mesh, part),
-        tasks=tuple(build_task(name, whole, models, targets.__getitem__, origin) for name in whole.tasks),
+        part=workpiece,
+        tasks=tuple(tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),
         motion=build_motion(whole.motion),
         solver=whole.solver.at_step(whole.motion.step_s),

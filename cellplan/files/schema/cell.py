@@ -4,6 +4,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
+from cellplan.files.schema.closed_shapes import PlaneWord
 from cellplan.files.schema.robot import RobotEntry
 from cellplan.files.schema.shapes import ObstacleEntry, PartShapeEntry, StepEntry
 from cellplan.files.schema.task import CornerChoice, Seconds, TaskAxis, TaskEntry, TimeLawChoice
@@ -67,6 +68,12 @@ class GraspEntry(Entry):
         return self
 
 
+class MirrorEntry(Entry):
+    """A mirror."""
+
+    plane: PlaneWord = Field(description="Plane of the part frame.")
+
+
 class PartEntry(Entry):
     """The workpiece, held by robots or fixed in the world."""
 
@@ -95,6 +102,12 @@ class PartEntry(Entry):
         if self.geometry is not None and self.step is not None:
             raise rule("unexpected key, geometry gives the shape already", "step")
         return self
+
+    mirror: MirrorEntry | None = setting(
+        None,
+        "The part and all tasks on it are mirrored across a plane of the part frame: push stays push, left and right "
+        "are exchanged. What holds the part stays.",
+    )
 
     @model_validator(mode="after")
     def _stands_somewhere(self) -> Self:

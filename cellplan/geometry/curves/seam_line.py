@@ -62,6 +62,7 @@ class SeamAngles:
     side: float = 0.0  # distance in [m] of a pass from the seam across the weld face, towards a wall
     out: float = 0.0  # distance in [m] of a pass from the seam, out of the part between the walls
     toward: str | None = None  # name of that wall; None for the other one than ``face``
+    is_mirrored: bool = False  # whether what is said of the left of travel holds for the right
 
     @property
     def is_offset(self) -> bool:
@@ -77,11 +78,11 @@ class CrossSection:
     open_side: Array  # along this wall, away from the other one
 
 
-def cross_section(line: SeamLine, face: str) -> CrossSection:
-    """Normal and open side of one of the walls at each point of a seam."""
+def cross_section(line: SeamLine, face: str, *, is_mirrored: bool = False) -> CrossSection:
+    """Normal and open side of one of the walls at each point of a seam; see ``SeamAngles.is_mirrored``."""
     t = line.tangents
     normal = _across(line.walls[face], t)
-    left = cross(normal, t)
+    left = cross(t, normal) if is_mirrored else cross(normal, t)
     others = [_across(wall, t) for name, wall in line.walls.items() if name != face]
     lean = np.sum(others[0] * left, axis=1, keepdims=True) if others else np.zeros((len(t), 1))
     return CrossSection(normal, np.where(lean < -FACE_ALIKE, -left, left))
@@ -89,7 +90,7 @@ def cross_section(line: SeamLine, face: str) -> CrossSection:
 
 def tool_axes(line: SeamLine, angles: SeamAngles) -> Array:
     """Unit tool axes into the part at each point of a seam, shape (N, 3), expressed in P."""
-    section = cross_section(line, angles.face)
+    section = cross_section(line, angles.face, is_mirrored=angles.is_mirrored)
     out = np.cos(angles.work) * section.normal + np.sin(angles.work) * section.open_side
     return -np.cos(angles.travel) * out + np.sin(angles.travel) * line.tangents
 
@@ -112,7 +113,7 @@ def weld_face(line: SeamLine, angles: SeamAngles) -> tuple[Array, Array]:
     """
     t, names = line.tangents, [*line.walls]
     out = _across(sum((_across(line.walls[name], t) for name in names), np.zeros_like(t)), t)
-    left = cross(out, t)
+    left = cross(t, out) if angles.is_mirrored else cross(out, t)
     toward = angles.toward or next((name for name in names if name != angles.face), None)
     if toward is None:
         return out, left

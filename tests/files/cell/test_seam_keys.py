@@ -10,6 +10,7 @@ from cellplan.files.cell.load import load_cell
 from cellplan.files.cell.write import render_cell
 from cellplan.model.cell.cell import Cell
 from cellplan.model.task.seam import WallPlace
+from cellplan.model.task.task import SpacePolylinePath
 
 Load = Callable[..., Cell]
 Refuse = Callable[..., list[str]]
@@ -198,3 +199,17 @@ def test_controller_that_weaves_by_another_amplitude_is_refused(refuse: Refuse) 
     assert refuse(*woven_by_controller(3)) == [
         "c:20: tasks.ring.path.weave.side_mm: expected 2, as controllers.welder.process.weave_mm weaves, got 3"
     ]
+
+
+def test_mirrored_cell_has_its_tasks_on_the_other_side_and_is_written_as_read(load: Load, tmp_path: Path) -> None:
+    mirror = ("  geometry: {cylinder", "  mirror: {plane: xz}\n  geometry: {cylinder")
+    line = "polyline: {points_mm: [[-100, 30, 250], [100, 30, 250]]}"
+    cell = load(mirror, path("walls: {floor: +z, web: -y}, from: floor", line))
+    (tmp_path / "again").write_text(render_cell(cell), encoding="utf-8")
+    task = cell.tasks[0]
+
+    assert isinstance(task.path, SpacePolylinePath)
+    assert task.path.points == ((-0.1, -0.03, 0.25), (0.1, -0.03, 0.25))
+    assert task.seam is not None
+    assert np.array_equal(task.seam.walls["web"], [0, 1, 0])
+    assert render_cell(load_cell("again")) == render_cell(cell)
