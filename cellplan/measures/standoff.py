@@ -13,6 +13,7 @@ from cellplan.measures.tool_errors import part_poses
 from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Standoff
+from cellplan.model.task.clocked_path import are_within
 from cellplan.model.task.task import Frame, OffPart, Task
 from cellplan.scene.collision.bodies import BodyPoses, prepare
 from cellplan.scene.collision.distance import measure
@@ -33,6 +34,8 @@ def standoffs(cell: Cell, schedule: Schedule, chains: Chains, q: RobotRows) -> t
         if task.relative_to is not Frame.PART:
             continue
         rows = np.flatnonzero((times >= max(task.start, task.judged_from)) & (times <= scheduled.end + task.off_delay))
+        if len(scheduled.process_on) > 1:
+            rows = rows[are_within(times[rows], scheduled.process_on)]
         rows = rows if len(rows) else np.array([len(times) - 1])
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(POSE_COUNT, len(rows))).round().astype(np.intp))]
         some = {name: values[rows] for name, values in q.items()}

@@ -1,5 +1,7 @@
 """Errors of tools on the part and of co-holders on their grasps, from the joint positions that were read back."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from cellplan.geometry.transforms import Array, inverse
@@ -47,6 +49,7 @@ def pose_accuracy(scheduled: TaskSchedule, X_PT: Array) -> TaskAccuracy:
         start_s=task.start,
         end_s=scheduled.end,
         judged_from=task.judged_from,
+        process_off=tuple((off, on) for (_, off), (on, _) in pairwise(scheduled.process_on)),
     )
 
 

@@ -32,7 +32,26 @@ SETTLED_S: Final = 0.3  # [s] without a further change after which a save counts
 EMPTIED_S: Final = 3.0  # [s] for which an emptied file may lack its new content: editors empty before they write
 ASK_EVERY_S: Final = 0.3  # [s] between two polls during a computation
 INPUT_SUFFIXES: Final = frozenset(
-    {".yaml", ".yml", ".csv", ".stl", ".obj", ".dae", ".ply", ".urdf", ".xacro", ".srdf", ".json"}
+    {
+        ".yaml",
+        ".yml",
+        ".csv",
+        ".apt",
+        ".cls",
+        ".cl",
+        ".nc",
+        ".gcode",
+        ".ngc",
+        ".tap",
+        ".stl",
+        ".obj",
+        ".dae",
+        ".ply",
+        ".urdf",
+        ".xacro",
+        ".srdf",
+        ".json",
+    }
 )
 MOST_ENTRIES: Final = 2000  # [-] files below the folder of a cell that are polled
 NOTHING: Final = digest(b"")  # of an empty file

@@ -226,9 +226,9 @@ def _models(valid: ValidEntries, document: YamlDocument, sources: Sources) -> di
 def _targets(valid: ValidEntries, sources: Sources) -> Targets:
     """Tool targets from files, by task."""
     samples = {
-        name: sources.targets(task.path.csv, ("tasks", name, "path", "csv"))
+        name: sources.targets(task.path, ("tasks", name, "path"))
         for name, task in valid.tasks.items()
-        if task.path.csv is not None
+        if task.path.file_key is not None
     }
     return {name: sampled for name, sampled in samples.items() if sampled is not None}
 

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
+from cellplan.files.cell.cam.apt import read_apt
+from cellplan.files.cell.cam.gcode import read_gcode
+from cellplan.files.cell.cam.settings import CamSettings
 from cellplan.files.cell.toolpath_csv import read_toolpath_csv
 from cellplan.files.input.files import AllowedFolders, digest_of_file
 from cellplan.files.input.findings import Finding, KeyPath, key_text, shown
@@ -16,7 +19,7 @@ from cellplan.files.robots.build_controller import with_zero_of_file
 from cellplan.files.robots.joint_table import RobotTable, load_bundled_table, load_robot_table
 from cellplan.files.robots.rules import limits_in_si, tightened
 from cellplan.files.robots.urdf import XACRO_SUFFIX
-from cellplan.files.schema.path import CsvEntry
+from cellplan.files.schema.path import CamEntry, CsvEntry, GcodeEntry, PathShapeEntry
 from cellplan.files.schema.robot import RobotEntry
 from cellplan.files.schema.tool import GripperEntry
 from cellplan.files.yaml.reader import YamlDocument
@@ -66,20 +69,22 @@ class Sources:
             return None
         return mesh
 
-    def targets(self, entry: str | CsvEntry, path: KeyPath) -> SampledPath | TimedPath | None:
-        """Tool targets of a task; None after a finding."""
-        settings = CsvEntry(file=entry) if isinstance(entry, str) else entry
-        place = self.file(settings.file, path if isinstance(entry, str) else (*path, "file"))
+    def targets(self, entry: PathShapeEntry, path: KeyPath) -> SampledPath | TimedPath | None:
+        """Tool targets of a task from the file of its path; None after a finding."""
+        key = entry.file_key or ""
+        written = getattr(entry, key)
+        kinds: dict[str, type[CsvEntry | CamEntry]] = {"csv": CsvEntry, "apt": CamEntry, "gcode": GcodeEntry}
+        settings = kinds[key](file=written) if isinstance(written, str) else written
+        place = self.file(settings.file, (*path, key) if isinstance(written, str) else (*path, key, "file"))
         if place is None:
             return None
         try:
-            sampled = read_toolpath_csv(
-                place,
-                is_smooth=settings.smooth,
-                is_closed=settings.closed,
-                source=settings.file,
-                join=settings.join_mm.si,
-            )
+            sampled: SampledPath | TimedPath
+            if isinstance(settings, CamEntry):
+                sampled, remark = (read_gcode if key == "gcode" else read_apt)(place, _cam_settings(settings))
+                self.remarks += [(key_text((*path, key)), remark)] if remark else []
+            else:
+                sampled = _sampled(settings, place)
             self.inputs[settings.file] = digest_of_file(place, file=settings.file)
         except InputError as error:
             self.errors.append(error)
@@ -242,6 +247,25 @@ class Sources:
                 path = ("robots", name, "package_dirs", index)
                 self.findings.append(self.document.finding(path, str(error)))
         return tuple(folders) if len(folders) == len(entry.package_dirs) else None
+
+
+def _sampled(entry: CsvEntry, place: Path) -> SampledPath | TimedPath:
+    """Tool targets of a table."""
+    return read_toolpath_csv(
+        place, is_smooth=entry.smooth, is_closed=entry.closed, source=entry.file, join=entry.join_mm.si
+    )
+
+
+def _cam_settings(entry: CamEntry) -> CamSettings:
+    """What a cell adds to a file of CAM."""
+    return CamSettings(
+        source=entry.file,
+        X_PF=entry.at.matrix,
+        transfer=entry.transfer_mm_s.si,
+        rounding=entry.rounding_mm.si,
+        stop_angle=entry.stop_deg.si,
+        chord=entry.chord_mm.si if isinstance(entry, GcodeEntry) else 0.0,
+    )
 
 
 def _only_for_urdf(name: str, entry: RobotEntry, document: YamlDocument) -> Iterator[Finding]:

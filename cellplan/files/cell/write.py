@@ -17,7 +17,7 @@ from cellplan.model.robot.robot import RobotModel, configuration_in_si, start_ke
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.units import Deg, Mm, file_number, in_si
 from cellplan.model.solver import Integrator
-from cellplan.model.task.task import SampledPath, Task, TimedPath
+from cellplan.model.task.task import ProgrammedPath, SampledPath, Task, TimedPath
 from cellplan.model.units import MM
 
 CONFIGURATIONS: Final = frozenset({"start", "start_deg", "home", "home_deg", "holder", "holder_deg"})
@@ -111,7 +111,7 @@ def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
     written = {**entry, "start_s": task.start}
     if task.duration is not None:
         written["duration_s"] = task.duration
-    if isinstance(task.path, SampledPath | TimedPath):
+    if isinstance(task.path, SampledPath | TimedPath) and not isinstance(task.path, ProgrammedPath):
         settings = {"file": task.path.source, "smooth": task.path.is_smooth, "closed": task.path.is_closed}
         if isinstance(task.path, SampledPath) and task.path.join:
             settings["join_mm"] = MM * task.path.join

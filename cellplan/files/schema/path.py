@@ -12,12 +12,14 @@ from cellplan.model.settings.entry import (
     Direction,
     Entry,
     OneOf,
+    PoseEntry,
+    SlidingSpeed,
     Text,
     by_kind,
     rule,
     setting,
 )
-from cellplan.model.settings.units import Mm, Within
+from cellplan.model.settings.units import Deg, Mm, MmPerS, Within
 
 COEFFICIENT_LIMIT: Final = 400  # more are a table of the motion, not a spline
 
@@ -25,6 +27,8 @@ JointValue = Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)]
 Row = tuple[float, ...] | dict[str, Any]
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
 CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
+CAM_WORDS: Final = "a file name or {file: part.apt, transfer_mm_s: 250}"
+OF_FILES: Final = ("csv", "apt", "gcode")
 MOST_JOINED_MM: Final = 1.0  # points farther apart than this are two points of a path
 
 
@@ -89,16 +93,50 @@ CsvChoice = Annotated[
 ]
 
 
+class CamEntry(Entry):
+    """Tool targets from a file of CAM, with feeds and rapids."""
+
+    file: Text = Field(description="File of the points.")
+    at: PoseEntry = setting(PoseEntry(), "Pose of the file's frame in the part frame.")
+    transfer_mm_s: SlidingSpeed = setting(MmPerS(250.0), "Speed of rapids; the process is off on them.")
+    rounding_mm: Annotated[Mm, Within(gt=0.0, le=MOST_JOINED_MM)] = setting(
+        Mm(0.01), "Largest distance of a corner that is passed without a stop from the straight sides."
+    )
+    stop_deg: Annotated[Deg, Within(gt=0.0, le=90.0)] = setting(
+        Deg(20.0), "Change of direction beyond which the tool stops at a corner."
+    )
+
+
+class GcodeEntry(CamEntry):
+    """Tool targets from G-code."""
+
+    chord_mm: Annotated[Mm, Within(gt=0.0, le=MOST_JOINED_MM)] = setting(
+        Mm(0.01), "Largest distance of an arc from the straight sides that stand for it."
+    )
+
+
+CamChoice = Annotated[
+    Annotated[Text, Tag(f"<{CAM_WORDS}>")] | Annotated[CamEntry, Tag("<mapping>")], by_kind(CAM_WORDS, mapping=dict)
+]
+GcodeChoice = Annotated[
+    Annotated[Text, Tag(f"<{CAM_WORDS}>")] | Annotated[GcodeEntry, Tag("<mapping>")], by_kind(CAM_WORDS, mapping=dict)
+]
+
+
 class PathShapeEntry(OneOf):
     """Exactly one path, and its projection onto the part."""
 
-    alternatives: ClassVar[tuple[str, ...]] = ("circle", "rectangle", "rhombus", "polyline", "csv")
+    alternatives: ClassVar[tuple[str, ...]] = ("circle", "rectangle", "rhombus", "polyline", *OF_FILES)
 
     circle: CircleEntry | None = setting(None, "Circle.")
     rectangle: RectangleEntry | None = setting(None, "Rectangle.")
     rhombus: RhombusEntry | None = setting(None, "Rhombus.")
     polyline: PolylineEntry | None = setting(None, "Points joined by straight sides.")
     csv: CsvChoice | None = setting(None, "Tool targets from a file.")
+    apt: CamChoice | None = setting(None, "Tool targets, feeds and rapids from a file of APT or CLDATA.")
+    gcode: GcodeChoice | None = setting(
+        None, "Tool targets, feeds and rapids from G-code of moves of the tool tip, with tool vectors I, J, K."
+    )
     project: Direction | None = setting(
         None,
         "Side of the part, as a direction in the part frame, from which the path is projected onto the part; absent: "
@@ -115,12 +153,24 @@ class PathShapeEntry(OneOf):
             raise rule("unexpected key, only a path in a plane has an offset", "offset_mm")
         if self.offset_mm is not None and self.project is not None:
             raise rule("unexpected key, a projected path lies on the surface", "offset_mm")
+        if self.has_feeds and self.project is not None:
+            raise rule("unexpected key, a path of CAM is used as it stands in the file", "project")
         return self
 
     @property
     def is_planar(self) -> bool:
         """Whether the path is drawn in a plane of the part frame."""
-        return self.polyline.plane is not None if self.polyline is not None else self.csv is None
+        return self.polyline.plane is not None if self.polyline is not None else self.file_key is None
+
+    @property
+    def file_key(self) -> str | None:
+        """Key of the file that the path is read from; None for a path without a file."""
+        return next((key for key in OF_FILES if getattr(self, key) is not None), None)
+
+    @property
+    def has_feeds(self) -> bool:
+        """Whether the file of the path states feeds."""
+        return self.apt is not None or self.gcode is not None
 
 
 class JointPathEntry(Entry):

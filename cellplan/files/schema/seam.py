@@ -163,6 +163,14 @@ class PathEntry(PathShapeEntry):
         return self
 
     @property
+    def seam_keys(self) -> tuple[str, ...]:
+        """Names of the keys that say more than the shape and the place of the path."""
+        more = {
+            name: field for name, field in type(self).model_fields.items() if name not in PathShapeEntry.model_fields
+        }
+        return tuple(field.alias or name for name, field in more.items() if getattr(self, name) != field.default)
+
+    @property
     def is_seam(self) -> bool:
         """Whether the tool is held to walls."""
         of_walls = self.walls, self.from_, self.toward

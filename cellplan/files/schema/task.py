@@ -34,9 +34,11 @@ from cellplan.model.settings.task import (
     WeldPositionEntry,
 )
 from cellplan.model.settings.units import Deg, Mm, Within
+from cellplan.model.units import MM
 
 MOST_DWELL: Final = 0.8  # [-] of the period of a weave
 EXCLUDED_BY_PROCESS: Final = ("duration_s", "feed_mm_s", "time_law", "settle_s")
+EXCLUDED_BY_FILE: Final = (*EXCLUDED_BY_PROCESS, "corners", "tool_turn_deg")  # of a path whose file states feeds
 
 Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
 
@@ -278,6 +280,8 @@ class TaskEntry(Entry):
         for key in EXCLUDED_BY_PROCESS if self.process else ():
             if getattr(self, key):
                 raise rule("unexpected key, process decides how fast the tool moves along its path", key)
+        if not self.path.has_feeds and self.process is not None and self.process.feed_mm_s is None:
+            raise rule("missing, expected the demanded feed, a number above 0 in mm/s", "process.feed_mm_s")
         if self.relative_to == "world" and self.path.project is not None:
             raise rule("unexpected key, a path in the world is not projected onto the part", "path.project")
         if self.path.is_seam and self.tool_axis is not None:
@@ -299,6 +303,20 @@ class TaskEntry(Entry):
             raise rule(f"expected at least approach_s = {self.approach_s:g}, got {self.start_s:g}", "start_s")
         if self.settle_s and self.approach_mm:
             raise rule("expected no time to settle, as the tool comes to its path by an approach", "settle_s")
+        return self
+
+    @model_validator(mode="after")
+    def _agrees_with_file(self) -> Self:
+        """A file that states feeds decides how fast the tool moves, and where it stops."""
+        for key in EXCLUDED_BY_FILE if self.path.has_feeds else ():
+            if getattr(self, key):
+                raise rule("unexpected key, the file of the path states the feeds, and its entry the stops", key)
+        if self.path.has_feeds and self.process is not None and self.process.feed_mm_s is not None:
+            raise rule("unexpected key, the file of the path states the feeds", "process.feed_mm_s")
+        for key in self.path.seam_keys if self.path.has_feeds else ():
+            raise rule("unexpected key, a path of CAM is used as it stands in the file", f"path.{key}")
+        if self.path.has_feeds and self.repeat > 1:
+            raise rule(f"expected 1 for a path whose file states feeds, got {self.repeat}", "repeat")
         return self
 
     @model_validator(mode="after")
@@ -333,8 +351,9 @@ class TaskEntry(Entry):
         if self.process is None and key is not None:
             raise rule("expected a process, whose feed says how long it is along the path", f"path.weave.{key}")
         if self.process is not None:
-            length = weave.wavelength_mm or self.process.feed_mm_s / (weave.frequency_hz or 1.0)
-            period = length / self.process.feed_mm_s
+            feed_mm_s = MM * self.process.feed
+            length = weave.wavelength_mm or feed_mm_s / (weave.frequency_hz or 1.0)
+            period = length / feed_mm_s
             dwells = weave.dwell_left_s + weave.dwell_right_s
             if dwells > MOST_DWELL * period:
                 text = f"expected dwells of at most {MOST_DWELL:g} of the period of {period:.4g} s, got {dwells:.4g} s"

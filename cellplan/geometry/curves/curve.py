@@ -100,16 +100,34 @@ def rounded_sides(knots: Array, corners: Array, blend: float) -> BezierCurve:
     """
     sides = np.diff(corners, axis=0)
     direction = sides / np.linalg.norm(sides, axis=1, keepdims=True)
+    return rounded_lines(knots, corners, direction, np.full(len(corners) - 2, blend))
+
+
+def rounded_lines(knots: Array, corners: Array, direction: Array, blends: Array) -> BezierCurve:
+    """As `rounded_sides`, for values that change at a rate along each side, rounded within a distance of its own.
+
+    Args:
+        knots: Parameters of the corners, shape (N,).
+        corners: Values there, shape (N, 3).
+        direction: Their derivative by the parameter on each side, shape (N - 1, 3).
+        blends: Distance by the parameter within which each inner corner is rounded, 0 for not at all, shape (N - 2,);
+            two neighbours fit on the side between them.
+    """
+    blend = blends[:, None]
     before, after = corners[1:-1] - blend * direction[:-1], corners[1:-1] + blend * direction[1:]
     starts, ends = np.vstack([corners[:1], after]), np.vstack([before, corners[-1:]])
     share = np.linspace(0.0, 1.0, len(CORNER_CONTROLS))[:, None]
     lines = starts[:, None] + share * (ends - starts)[:, None]
     along = np.where((CORNER_CONTROLS < 0.0)[:, None], direction[:-1, None], direction[1:, None])
-    turns = corners[1:-1, None] + blend * CORNER_CONTROLS[:, None] * along
+    turns = corners[1:-1, None] + blend[:, None] * CORNER_CONTROLS[:, None] * along
     spans = np.empty((2 * len(lines) - 1, len(CORNER_CONTROLS), 3))
     spans[0::2], spans[1::2] = lines, turns
-    edges = np.concatenate([knots[:1], np.column_stack([knots[1:-1] - blend, knots[1:-1] + blend]).ravel(), knots[-1:]])
-    is_long = np.diff(edges) > 1e-9 * blend  # a side that its two roundings use up leaves no straight rest
+    edges = np.concatenate(
+        [knots[:1], np.column_stack([knots[1:-1] - blends, knots[1:-1] + blends]).ravel(), knots[-1:]]
+    )
+    is_long = np.diff(edges) > 1e-9 * blends.max(
+        initial=0.0
+    )  # a side that its two roundings use up leaves no straight rest
     return BezierCurve(knots=np.concatenate([edges[:-1][is_long], edges[-1:]]), control=spans[is_long])
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.errors import NoSolutionError, TooFewStepsError
 from cellplan.jobs.fastest.timed_program import NEAR, Binding, Law, SolvedAt, TimedProgram, scaled_values
 from cellplan.model.cell.cell import Cell
-from cellplan.model.task.task import Task
+from cellplan.model.task.task import ProgrammedPath, Task
 from cellplan.model.units import MM
 
 MOST_SLOWER: Final = 8  # programs tried until one keeps every limit
@@ -97,7 +97,7 @@ def _no_time_law(base: Cell, solved: SolvedAt) -> NoSolutionError:
     """Why no clock is slow enough: feeds of processes that joints cannot hold, else speeds that jump."""
     values, reasons = scaled_values(base, SLOWED), list[str]()
     slow = solved(Law.TIME_LAWS, values, "time laws")
-    left = [task for task in base.tasks if task.process is not None]
+    left = [task for task in base.tasks if task.process is not None and not isinstance(task.path, ProgrammedPath)]
     while slow.load > 1.0 and left:
         worst = max(slow.bindings, key=lambda binding: binding.time_share)
         left.sort(key=lambda task: task.robot != worst.robot)  # a positioner holds the feeds of all its operators

@@ -10,7 +10,9 @@ from cellplan.files.yaml.edit import changed_text
 from cellplan.model.cell.cell import Cell
 
 BEST: Final = "best.yaml"
-NAMING: Final = frozenset({"model", "mesh", "csv", "file", "srdf", "moveit_limits"})  # keys whose values may name files
+NAMING: Final = frozenset(
+    {"model", "mesh", "csv", "apt", "gcode", "file", "srdf", "moveit_limits"}
+)  # keys whose values may name files
 FOLDERS: Final = frozenset({"package_dirs"})
 MAX_BYTES: Final = 2_000_000_000
 

@@ -13,7 +13,7 @@ from cellplan.geometry.frozen import derive
 from cellplan.model.motion.joint_path import JointPath
 from cellplan.model.motion.plan import Phase, Plan, rows_of
 from cellplan.model.solver import Integrator
-from cellplan.model.task.clocked_path import ClockedPath, distinct
+from cellplan.model.task.clocked_path import ClockedPath, DemandedSpan, Spans, distinct
 from cellplan.model.task.task import TIME_TOLERANCE, Task
 
 
@@ -74,8 +74,8 @@ class TaskSchedule:
     cycle_ends: tuple[float, ...] = ()
     # times in [s] at which a stretch of the path with its own start and stop of the time law begins or ends
     stops: tuple[float, ...] = ()
-    # stretches of time in [s] in which the feed of a process is demanded, as (from, to)
-    demanded: tuple[tuple[float, float], ...] = ()
+    demanded: tuple[DemandedSpan, ...] = ()  # stretches of time in which the feed of a process is demanded
+    process_on: Spans = ()  # stretches of time in [s] in which a process is on; without one, that of the path
     # largest distance in [m] of a smooth path from the straight lines between its points, else None
     bulge: float | None = None
 

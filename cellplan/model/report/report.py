@@ -16,6 +16,7 @@ from cellplan.model.report.skew import SkewReport
 from cellplan.model.report.stops import StopReport
 from cellplan.model.robot.payload import LoadUse
 from cellplan.model.robot.repeatability import Repeatability
+from cellplan.model.task.clocked_path import Spans
 from cellplan.model.units import MM, DisplayUnit, joint_unit, rounded_down
 
 CAUTION = (
@@ -99,6 +100,7 @@ class TaskAccuracy:
     # largest distance in [m] of a smooth path from the straight lines between its points, else None
     path_bulge: float | None = None
     judged_from: float = 0.0  # time in [s] from which its errors are judged: 0 unless the tool needs time to settle
+    process_off: Spans = ()  # stretches of time in [s] along its path, from rapid to rapid, in which its process is off
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

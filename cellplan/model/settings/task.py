@@ -86,8 +86,10 @@ class WeldPositionEntry(Entry):
 class ProcessEntry(Entry):
     """A process that demands a feed: welding, sealing, dispensing."""
 
-    feed_mm_s: SlidingSpeed = Field(
-        description="Demanded speed of the tool along its path on the surface, but for the ramps beside each stop."
+    feed_mm_s: SlidingSpeed | None = setting(
+        None,
+        "Demanded speed of the tool along its path on the surface, but for the ramps beside each stop; not for a path "
+        "whose file states the feeds.",
     )
     tolerance_percent: Annotated[float, Field(gt=0.0, le=50.0)] = setting(
         5.0, "By how much the speed between two rows may differ from the feed."
@@ -103,6 +105,11 @@ class ProcessEntry(Entry):
         "Time in which the tool comes from rest to the feed and back, at both ends of the path and at corners at "
         "which it stops; the process is on, the feed is not judged.",
     )
+
+    @property
+    def feed(self) -> float:
+        """Demanded speed in [m/s], the greatest one of a path with several."""
+        return 0.0 if self.feed_mm_s is None else self.feed_mm_s.si
 
     @property
     def tolerance(self) -> float:

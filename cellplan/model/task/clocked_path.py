@@ -1,16 +1,19 @@
 """Clocked path: the desired motion of one tool at any time, and the times at which it is not smooth."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
+from cellplan.geometry.arrays import Flags
 from cellplan.geometry.curves.arc_length import QuickParameters
 from cellplan.geometry.curves.curve import Interval
 from cellplan.geometry.transforms import Array, rotation_about
+from cellplan.model.task.pace import Pace
 from cellplan.model.task.task import TIME_TOLERANCE, Task, TimeLawKind
 from cellplan.model.task.time_law import advance, reached_at, stand_off
 from cellplan.model.task.toolpath import TOOL_Z, Toolpath
@@ -19,6 +22,14 @@ SAME_PLACE: Final = 1e-12  # [-] of the whole length: knots nearer to a stop lie
 INSTANT: Final = 1e-5  # [s] before and after a time: what the tool travels between gives its speed
 MOST_BREAKS: Final = 2_000_000  # smooth stretches of a motion; integration over more of them takes too long
 Spans = tuple[tuple[float, float], ...]
+
+
+class DemandedSpan(NamedTuple):
+    """A stretch of time in which the feed of a process is demanded."""
+
+    begin: float  # its begin in [s]
+    end: float  # its end in [s]
+    feed: float  # the feed in [m/s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,6 +43,8 @@ class ClockedPath:
     corners: Array
     behind: Array  # length in [m] behind each stop of one cycle, shape (pieces + 1,)
     quick: QuickParameters  # way from lengths to parameters of the path for a few times at a time
+    # speeds of the stretches of a path whose file states feeds; ``behind`` then has an entry for each of their ends
+    pace: Pace | None = None
 
     @property
     def start(self) -> float:
@@ -71,11 +84,11 @@ class ClockedPath:
     @property
     def jumps(self) -> Array:
         """The breaks that do not come from knots of the path, in [s], increasing, shape (J,)."""
-        breaks = [self.corners, np.array([self.over]), np.array(fixed_rests(self.task, self.corners)).ravel()]
+        breaks = [self.corners, np.array([self.over]), np.array(fixed_rests(self)).ravel()]
         if self.task.approach is not None:
             breaks.append(np.array([self.task.start - self.task.approach.duration]))
         if self.task.time_law.kind in {TimeLawKind.TRAPEZOID, TimeLawKind.STEADY} and not self.toolpath.is_timed:
-            ramp = ramp_shares(self.task, self.corners) * np.diff(self.corners)
+            ramp = ramp_shares(self) * np.diff(self.corners)
             breaks += [self.corners[:-1] + ramp, self.corners[1:] - ramp]
         return distinct(np.concatenate(breaks))
 
@@ -147,7 +160,8 @@ class ClockedPath:
         elapsed = np.where(
             elapsed <= TIME_TOLERANCE, 0.0, np.where(duration - elapsed <= TIME_TOLERANCE, duration, elapsed)
         )
-        law = advance(task.time_law, elapsed / duration, ramp_shares(task, self.corners)[stretch])
+        drops = None if self.pace is None else self.pace.drops[stretch]
+        law = advance(task.time_law, elapsed / duration, ramp_shares(self)[stretch], drops)
         if toolpath.runs_on:
             length = np.full(len(times), task.repeat * behind[-1])
             cycle = np.clip((law.share * length) // behind[-1], 0, task.repeat - 1)
@@ -157,6 +171,7 @@ class ClockedPath:
             cycle, piece = np.divmod(stretch, len(behind) - 1)
             length = np.diff(behind)[piece]
             s = behind[piece] + law.share * length
+            piece = piece if self.pace is None else self.pace.pieces[piece]
         X_PT, twists = toolpath.targets(piece, s, quick=quick)
         if task.repeat > 1 and toolpath.turn:
             X_PT[:, :3, :3] = X_PT[:, :3, :3] @ rotation_about(TOOL_Z, cycle * toolpath.turn)
@@ -164,7 +179,7 @@ class ClockedPath:
 
     def _instants(self, knots: Array) -> Array:
         """Times in [s] at which the path passes its knots, of all cycles, shape (N,)."""
-        path, law, ramps = self.toolpath, self.task.time_law, ramp_shares(self.task, self.corners)
+        path, law, ramps = self.toolpath, self.task.time_law, ramp_shares(self)
         cycles = np.arange(self.task.repeat)[:, None]
         if path.is_timed:
             return (self.corners[:-1, None] + knots).ravel()
@@ -181,7 +196,7 @@ class ClockedPath:
             return self.start + (self.end - self.start) * reached_at(law, share, float(ramps[0]))
         stretch = cycles * pieces + piece
         done = np.broadcast_to((s - self.behind[piece]) / np.diff(self.behind)[piece], stretch.shape)
-        tau = reached_at(law, done, ramps[stretch])
+        tau = reached_at(law, done, ramps[stretch], None if self.pace is None else self.pace.drops[stretch])
         return (self.corners[stretch] + np.diff(self.corners)[stretch] * tau).ravel()
 
 
@@ -214,6 +229,14 @@ def distinct(times: Array) -> Array:
     return ordered[np.diff(ordered, prepend=-np.inf) > TIME_TOLERANCE]
 
 
+def are_within(times: Array, spans: Iterable[tuple[float, float]]) -> Flags:
+    """Which times in [s], shape (N,), lie in one of some stretches, ends included."""
+    inside = np.zeros(len(times), dtype=bool)
+    for begin, end in spans:
+        inside |= (times >= begin - TIME_TOLERANCE) & (times <= end + TIME_TOLERANCE)
+    return inside
+
+
 def leaves_at(task: Task, corners: Array) -> float:
     """Time in [s] at which a tool leaves the end of its path: after the delay of its process, and a dwell.
 
@@ -222,28 +245,50 @@ def leaves_at(task: Task, corners: Array) -> float:
     return float(corners[-1]) + task.off_delay + task.dwell
 
 
-def process_span(task: Task, corners: Array) -> tuple[float, float]:
-    """Times in [s] between which a process is on; without one, those at which the path starts and ends."""
-    return task.start, float(corners[-1]) + task.off_delay
+def process_spans(path: ClockedPath) -> Spans:
+    """Stretches of time in [s] in which a process is on; without one, that from the start of the path to its end."""
+    task, corners, pace = path.task, path.corners, path.pace
+    if pace is None:
+        return ((task.start, path.end + task.off_delay),)
+    edges = np.flatnonzero(np.diff(pace.is_on.astype(np.int8))) + 1  # off and on in turns
+    inner = corners[edges].tolist()
+    ends = [task.start, *inner, path.end + task.off_delay]
+    return tuple(zip(ends[0::2], ends[1::2], strict=True))
 
 
-def fixed_rests(task: Task, corners: Array) -> Spans:
+def fixed_rests(path: ClockedPath) -> Spans:
     """Stretches of time in [s] that a retimed program keeps: the delays of a process, and a dwell."""
-    on, off = process_span(task, corners)
-    ends = (on, float(corners[0])), (float(corners[-1]), off), (off, leaves_at(task, corners))
-    return tuple((begin, end) for begin, end in ends if end - begin > TIME_TOLERANCE)
+    task, corners = path.task, path.corners
+    off = path.end + task.off_delay
+    ends = [(task.start, path.start), (path.end, off), (off, leaves_at(task, corners))]
+    if path.pace is not None:
+        ends += [(corners[k], corners[k + 1]) for k in np.flatnonzero(path.pace.tops == 0.0)]
+    return tuple((float(begin), float(end)) for begin, end in ends if end - begin > TIME_TOLERANCE)
 
 
-def demanded_spans(task: Task, corners: Array) -> Spans:
+def demanded_spans(path: ClockedPath) -> tuple[DemandedSpan, ...]:
     """Stretches of time in [s] in which the feed of a process is demanded: between its ramps."""
+    task, corners, pace = path.task, path.corners, path.pace
     if task.process is None:
         return ()
     ramp = task.process.ramp_s
-    spans = ((begin + ramp, end - ramp) for begin, end in pairwise(corners.tolist()))
-    return tuple((begin, end) for begin, end in spans if end - begin > TIME_TOLERANCE)
+    if pace is None:
+        spans = [DemandedSpan(begin + ramp, end - ramp, task.process.feed) for begin, end in pairwise(corners.tolist())]
+    else:
+        ramps = ramp * (pace.drops > 0.0)
+        ends = zip(corners[:-1] + ramps[:, 0], corners[1:] - ramps[:, 1], pace.tops, strict=True)
+        spans = [DemandedSpan(*map(float, it)) for it, has_feed in zip(ends, pace.is_at_feed, strict=True) if has_feed]
+    return tuple(span for span in spans if span.end - span.begin > TIME_TOLERANCE)
 
 
-def ramp_shares(task: Task, corners: Array) -> Array:
+def stops_of(path: ClockedPath) -> Array:
+    """Times in [s] at which a tool stands on its path, at the ends of its stretches, shape (n,)."""
+    return path.corners if path.pace is None else path.corners[np.append(path.pace.drops[:, 0] == 1.0, True)]
+
+
+def ramp_shares(path: ClockedPath) -> Array:
     """Share of the time of each stretch that a ramp of its time law takes, shape (corners - 1,)."""
-    duration = np.diff(corners)
+    task, duration = path.task, np.diff(path.corners)
+    if path.pace is not None:
+        return path.pace.ramps
     return np.full(len(duration), task.time_law.ramp) if task.process is None else task.process.ramp_s / duration

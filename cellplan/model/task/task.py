@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.curves.seam_line import SeamLine
-from cellplan.geometry.transforms import Array
 from cellplan.model.origin import Origin
 from cellplan.model.settings.task import ProcessEntry, ToleranceEntry, TorchEntry, WeldPositionEntry
 from cellplan.model.task.seam import Seam, Stretch, Weave
@@ -81,6 +81,26 @@ class SampledPath:
     join: float = 0.0  # distance in [m] within which points of the file were joined to the point before; 0 for none
     # line of each point in the file, for messages; empty where they follow one another from line 2
     lines: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProgrammedPath(SampledPath):
+    """Tool targets of a CAM file with the speed of each straight side; it begins and ends with the process on."""
+
+    speeds: Array  # speed of each side in [m/s]: the feed of the file, or the stated one of rapids, shape (N - 1,)
+    is_rapid: Flags  # whether the process is off on each side, shape (N - 1,)
+    rounding: float  # largest distance in [m] of a rounded corner from the sides
+    stop_angle: float  # change of direction in [rad] from which on a corner is a stop
+
+    @property
+    def feeds(self) -> Array:
+        """Different feeds of the process in [m/s], increasing."""
+        return np.unique(self.speeds[~self.is_rapid])
+
+    @property
+    def holds_one_feed(self) -> bool:
+        """Whether the process is on all along the path, at one feed."""
+        return len(self.feeds) == 1 and not self.is_rapid.any()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -292,6 +312,11 @@ class Task:
     def leaving(self) -> float:
         """Time in [s] after the end of the path that the delay of the process, the dwell and a retreat take."""
         return self.off_delay + self.dwell + (self.retract.duration if self.retract else 0.0)
+
+    @property
+    def has_one_feed(self) -> bool:
+        """Whether a process has one feed all along the path; not where its file states several, or rapids."""
+        return not isinstance(self.path, ProgrammedPath) or self.path.holds_one_feed
 
     @property
     def is_on_part(self) -> bool:

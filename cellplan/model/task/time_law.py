@@ -21,14 +21,16 @@ class Advance:
     acceleration: Array
 
 
-def advance(law: TimeLaw, tau: Array, ramp: Array | float | None = None) -> Advance:
+def advance(law: TimeLaw, tau: Array, ramp: Array | float | None = None, drops: Array | None = None) -> Advance:
     """How far a law has come at shares ``tau`` of the time, 0..1, shape (N,).
 
     Constant: ``sigma = tau``. Quintic: ``sigma = 10 tau^3 - 15 tau^4 + 6 tau^5``, at rest and without acceleration at
     both ends. Trapezoid: even speeding up and slowing down, each during ``ramp`` of the time, at rest at both ends.
     Steady: likewise, with accelerations that start and end at zero.
 
-    ``ramp`` is the share of the time that a ramp takes, one for all or shape (N,); None for that of the law.
+    ``ramp`` is the share of the time that a ramp takes, one for all or shape (N,); None for that of the law. ``drops``
+    are the shares of the top speed that a steady law lacks at its begin and at its end, shape (N, 2): 1 at rest, 0
+    where there is no ramp; None for rest at both ends.
     """
     share = law.ramp if ramp is None else ramp
     match law.kind:
@@ -44,7 +46,7 @@ def advance(law: TimeLaw, tau: Array, ramp: Array | float | None = None) -> Adva
         case TimeLawKind.TRAPEZOID:
             return _trapezoid(tau, share)
         case TimeLawKind.STEADY:
-            return _steady(tau, share)
+            return _steady(tau, share, np.ones(2) if drops is None else drops.T)
 
 
 def peak_rate(law: TimeLaw) -> float:
@@ -58,33 +60,46 @@ def peak_rate(law: TimeLaw) -> float:
             return 1.0 / (1.0 - law.ramp)
 
 
-def reached_at(law: TimeLaw, share: Array, ramp: Array | float | None = None) -> Array:
-    """Shares of the time, 0..1, at which a law has come to shares of the stretch, shape (N,): by halving."""
+def reached_at(law: TimeLaw, share: Array, ramp: Array | float | None = None, drops: Array | None = None) -> Array:
+    """Shares of the time, 0..1, at which a law has come to shares of the stretch, shape (N,): by halving.
+
+    See `advance` for ramps and drops.
+    """
     tau: Array = np.where(share >= 1.0, 1.0, 0.0)
     is_inside = (share > 0.0) & (share < 1.0)
     inside, inside_ramp = share[is_inside], ramp[is_inside] if isinstance(ramp, np.ndarray) else ramp
+    inside_drops = None if drops is None else drops[is_inside]
     if not len(inside):
         return tau
     low, high = np.zeros_like(inside), np.ones_like(inside)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        is_short = advance(law, middle, inside_ramp).share < inside
+        is_short = advance(law, middle, inside_ramp, inside_drops).share < inside
         low, high = np.where(is_short, middle, low), np.where(is_short, high, middle)
     tau[is_inside] = 0.5 * (low + high)
     return tau
 
 
-def _steady(tau: Array, ramp: Array | float) -> Advance:
-    """As a trapezoid, but with the rate ``3 x^2 - 2 x^3`` of the top one at a share x of a ramp."""
-    v = 1.0 / (1.0 - ramp)
+def _steady(tau: Array, ramp: Array | float, drops: Array) -> Advance:
+    """As a trapezoid, but with the rate ``1 - d + d (3 x^2 - 2 x^3)`` of the top one at a share x of a ramp.
+
+    ``drops`` has the d of the first ramp and of the last one, shape (2,) or (2, N).
+    """
+    first, last = drops
+    v = 1.0 / (1.0 - 0.5 * (first + last) * ramp)
     x = np.minimum(np.minimum(tau, 1.0 - tau) / ramp, 1.0)
-    begun = v * ramp * x**3 * (1.0 - 0.5 * x)
-    ramps = [tau < ramp, 1.0 - tau < ramp]
+    ramps = [(tau < ramp) & (first > 0.0), (1.0 - tau < ramp) & (last > 0.0)]
+    begun, even = v * ramp * x**3 * (1.0 - 0.5 * x), v * ramp * x
     bend = 6.0 * v / ramp * x * (1.0 - x)
+    grown = v * x * x * (3.0 - 2.0 * x)
     return Advance(
-        share=np.select(ramps, [begun, 1.0 - begun], v * (tau - 0.5 * ramp)),
-        rate=v * x * x * (3.0 - 2.0 * x),
-        acceleration=np.select(ramps, [bend, -bend], 0.0),
+        share=np.select(
+            ramps,
+            [first * begun + (1.0 - first) * even, 1.0 - (last * begun + (1.0 - last) * even)],
+            v * (tau - 0.5 * ramp * first),
+        ),
+        rate=np.select(ramps, [first * grown + (1.0 - first) * v, last * grown + (1.0 - last) * v], v),
+        acceleration=np.select(ramps, [first * bend, -last * bend], 0.0),
     )
 
 

@@ -21,10 +21,11 @@ from cellplan.geometry.shapes import bounding_box
 from cellplan.geometry.transforms import Array, frame_from_axes, inverse, is_rigid, pose_from, rotation_vector
 from cellplan.model.cell.cell import Part
 from cellplan.model.task.seam import Stretch
-from cellplan.model.task.task import Frame, SampledPath, Task, TimedPath
+from cellplan.model.task.task import Frame, ProgrammedPath, SampledPath, Task, TimedPath
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.path.curve import PathCurve, path_curve
 from cellplan.planning.path.formatting import MM, direction_name, in_mm, length
+from cellplan.planning.path.programmed import programmed_curve, with_programmed_corners
 from cellplan.planning.path.projection import along, project_path
 from cellplan.planning.path.seam import follow_seam
 from cellplan.planning.path.stretch import along_stretches, back_at_end, stretch_of
@@ -52,7 +53,7 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
         InputError: The path cannot be drawn, misses the part, runs over an edge, leaves the tool's turn open, or is to
             be gone through again and does not come back to its start.
     """
-    outline = path_curve(task)
+    outline = programmed_curve(task.path) if isinstance(task.path, ProgrammedPath) else path_curve(task)
     refuse_path_in_metres(outline.curve, task=task, part=part)
     curve, orientation = _with_tool(task, project_path(outline, task, part))
     arc = measure(curve.curve)
@@ -228,7 +229,9 @@ def _from_file(path: SampledPath | TimedPath, task: Task, drawing: PathCurve) ->
         raise InputError(f"{where}: expected tool axes of length 1 in {path.source}")
     cross, dot = np.linalg.norm(np.cross(axes[:-1], axes[1:]), axis=1), np.sum(axes[:-1] * axes[1:], axis=1)
     _refuse_wide(np.arctan2(cross, dot), WIDEST_LEAN, path, where=where)
-    if isinstance(path, TimedPath):
+    if isinstance(path, ProgrammedPath):
+        curve = with_programmed_corners(path, axes)
+    elif isinstance(path, TimedPath):
         curve = spline_through(path.times, axes, is_closed=path.is_closed)
     else:
         curve = smooth_through(drawing.given, axes, breaks=breaks)

@@ -228,7 +228,7 @@ def _sides(points: Array, task: Task) -> PathCurve:
     """Straight sides that stop at every corner, or rounded corners without a stop."""
     given = chord_lengths(points)
     is_closed = bool(np.linalg.norm(points[-1] - points[0]) <= SAME_POINT)
-    angles = _turns(points)
+    angles = turns(points)
     is_corner = np.concatenate([[True], angles > STRAIGHT_ON, [True]])
     if task.project is not None:
         _refuse_hidden_sides(points, task.project, task.where("path"))
@@ -238,7 +238,7 @@ def _sides(points: Array, task: Task) -> PathCurve:
     corners, at = points[is_corner], given[is_corner]
     seen = corners if task.project is None else corners - np.outer(corners @ task.project, task.project)
     _refuse_blend(
-        corners, np.maximum(_turns(corners), _turns(seen)), task.blend, task.where("corners", shared="motion.corners")
+        corners, np.maximum(turns(corners), turns(seen)), task.blend, task.where("corners", shared="motion.corners")
     )
     rounded: BezierCurve = rounded_sides(at, corners, task.blend)
     return PathCurve(curve=rounded, stops=given[[0, -1]], given=given, is_closed=is_closed)
@@ -257,7 +257,7 @@ def _refuse_hidden_sides(points: Array, direction: Array, where: str) -> None:
         )
 
 
-def _turns(points: Array) -> Array:
+def turns(points: Array) -> Array:
     """Change of direction in [rad] at each inner point of straight sides, shape (N - 2,)."""
     sides = np.diff(points, axis=0)
     t = sides / np.linalg.norm(sides, axis=1, keepdims=True)

@@ -13,11 +13,20 @@ from cellplan.geometry.transforms import Array, rotation_vector
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Clock, Schedule, TaskSchedule
 from cellplan.model.settings.task import ProcessEntry
-from cellplan.model.task.clocked_path import ClockedPath, demanded_spans, leaves_at, ramp_shares
-from cellplan.model.task.task import TIME_TOLERANCE, Task
+from cellplan.model.task.clocked_path import (
+    ClockedPath,
+    DemandedSpan,
+    demanded_spans,
+    leaves_at,
+    process_spans,
+    ramp_shares,
+    stops_of,
+)
+from cellplan.model.task.task import TIME_TOLERANCE, ProgrammedPath, Task
 from cellplan.model.task.time_law import peak_rate, reached_at, stand_off
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.model.units import MM
+from cellplan.planning.timing.stated_feeds import pace_of
 
 MOST_SAMPLES: Final = 2_000_000  # tables longer than this fill disks, not controllers
 ROTATIONS: Final = 3  # components of a task from here on are rotations
@@ -55,7 +64,8 @@ def retimed_schedule(schedule: Schedule, clock: Clock) -> Schedule:
         nominal = _on_clock(clock.sigma, path)
         nominal_times = [path.task.start, nominal.end, *nominal.cycle_ends, *nominal.stops]
         start, end, *rest = clock.reached_at(np.array(nominal_times)).tolist()
-        cycles, demanded = len(nominal.cycle_ends), np.array(nominal.demanded).reshape(-1, 2)
+        cycles, demanded = len(nominal.cycle_ends), np.array(nominal.demanded).reshape(-1, 3)
+        process_on = clock.reached_at(np.array(nominal.process_on).reshape(-1, 2)).tolist()
         tasks.append(
             replace(
                 nominal,
@@ -64,7 +74,10 @@ def retimed_schedule(schedule: Schedule, clock: Clock) -> Schedule:
                 end=end,
                 cycle_ends=tuple(rest[:cycles]),
                 stops=tuple(rest[cycles:]),
-                demanded=tuple((begin, end) for begin, end in clock.reached_at(demanded).tolist()),
+                demanded=tuple(
+                    map(DemandedSpan, *clock.reached_at(demanded[:, :2]).T.tolist(), demanded[:, 2].tolist())
+                ),
+                process_on=tuple((begin, end) for begin, end in process_on),
             )
         )
     return Schedule(times=clock.times, tasks=tuple(tasks), paths=schedule.paths, clock=clock)
@@ -99,11 +112,17 @@ def clock_path(cell: Cell, task: Task, toolpath: Toolpath) -> ClockedPath:
     Each stretch between two stops takes its own start and stop of the task's time law: with a duration given in
     proportion to its length, with a feed in the time that brings its fastest moment to the feed. A path that is gone
     through several times stops where it has corners; without any, all cycles are one stretch. A trajectory keeps its
-    own times. Before its start and after its end a tool rests on the part, or off it where the task says so.
+    own times, and a path whose file states feeds takes the time that these need. Before its start and after its end a
+    tool rests on the part, or off it where the task says so.
 
     Raises:
         InputError: The task has no time left, or more stops than anybody counts.
     """
+    if isinstance(task.path, ProgrammedPath):
+        corners, behind, pace = pace_of(task, task.path, toolpath)
+        return ClockedPath(
+            task=task, toolpath=toolpath, corners=corners, behind=behind, quick=quickly(toolpath.arc), pace=pace
+        )
     return ClockedPath(
         task=task,
         toolpath=toolpath,
@@ -195,8 +214,9 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
         bulge=path.toolpath.bulge,
         end=path.end,
         cycle_ends=_cycle_ends(path, corners),
-        stops=tuple(corners.tolist()),
-        demanded=demanded_spans(task, path.corners),
+        stops=tuple((corners if path.pace is None else stops_of(path)).tolist()),
+        demanded=demanded_spans(path),
+        process_on=process_spans(path),
     )
 
 
@@ -209,7 +229,7 @@ def _cycle_ends(path: ClockedPath, corners: Array) -> tuple[float, ...]:
         return ()
     shares = np.arange(1, task.repeat + 1) / task.repeat
     if toolpath.runs_on and not toolpath.is_timed:
-        shares = reached_at(task.time_law, shares, float(ramp_shares(task, corners)[0]))
+        shares = reached_at(task.time_law, shares, float(ramp_shares(path)[0]))
     return tuple((corners[0] + shares * (corners[-1] - corners[0])).tolist())
 
 
@@ -253,14 +273,14 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
 
 def _at_feed(task: Task, process: ProcessEntry, behind: Array) -> Array:
     """Times in [s] of the stops of a path with a demanded feed: a ramp takes half of its time for its length."""
-    lengths, least = np.diff(behind), process.feed_mm_s.si * process.ramp_s
+    lengths, least = np.diff(behind), process.feed * process.ramp_s
     if lengths.min() < least:
         raise InputError(
             f"{task.where('process.ramp_s')}: expected ramps that leave the feed of {process.feed_mm_s:g} mm/s some of "
             f"each side, got {process.ramp_s:g} s for one of {MM * lengths.min():.4g} mm; round the corners "
-            f"(corners: {{blend_mm: 5}}) or make it shorter than {lengths.min() / process.feed_mm_s.si:.3g} s"
+            f"(corners: {{blend_mm: 5}}) or make it shorter than {lengths.min() / process.feed:.3g} s"
         )
-    return task.moves_from + np.append(0.0, np.cumsum(lengths / process.feed_mm_s.si + process.ramp_s))
+    return task.moves_from + np.append(0.0, np.cumsum(lengths / process.feed + process.ramp_s))
 
 
 def _stops(task: Task, toolpath: Toolpath) -> Array:

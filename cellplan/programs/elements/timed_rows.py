@@ -1,6 +1,6 @@
 """Rows with times as formats of joint tables share them: one clock, paths of files, decimals of a robot."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
@@ -9,9 +9,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Robot
-from cellplan.model.motion.plan import Interval
 from cellplan.model.report.exported import ProgramRows, RobotRows
-from cellplan.model.task.task import TIME_TOLERANCE
 from cellplan.programs.elements.joints import LARGEST
 
 NANO: Final = 1_000_000_000  # [ns/s]
@@ -70,14 +68,6 @@ def are_near(times: Array, others: Sequence[float] | Array, tolerance: float) ->
     after = np.searchsorted(ordered, times)
     near: Flags = np.minimum(ordered[after] - times, times - ordered[after - 1]) <= tolerance
     return near
-
-
-def are_within(sigma: Array, stretches: Iterable[Interval]) -> Flags:
-    """Whether nominal times in [s], shape (N,), lie in one of some stretches, ends included."""
-    inside = np.zeros(len(sigma), dtype=bool)
-    for begin, end in stretches:
-        inside |= (sigma >= begin - TIME_TOLERANCE) & (sigma <= end + TIME_TOLERANCE)
-    return inside
 
 
 def require_paths(files: Mapping[str, str], expected: Collection[str]) -> None:

@@ -148,8 +148,13 @@ def _with_lines(
     for task, holder in on_moving_parts(full, essential) if frame.promise.waits else ():
         if (robot := frame.cell.task(task).robot) in frame.robots and holder not in in_step(frame, robot):
             by_joints[task] = f"'{holder}' moves the part while the tool works"
-            if frame.moves is Moves.LINEAR:
-                raise NotVerifiedError([f"--moves linear: task '{task}': {by_joints[task]}"])
+    for entry in frame.cell.tasks:
+        if entry.robot in frame.robots and not entry.has_one_feed:
+            by_joints[entry.name] = (
+                "its file states several feeds or rapids, which lines do not hold; write --format csv"
+            )
+    if frame.moves is Moves.LINEAR and by_joints:
+        raise NotVerifiedError([f"--moves linear: task '{name}': {reason}" for name, reason in by_joints.items()])
     limits = LineLimits(most, dialect.smallest_zone)
     while True:
         lines = with_seams(shared.scene, job, full, essential, limits=limits, by_joints=by_joints)

@@ -21,9 +21,9 @@ from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.motion.motion import JointTable, Schedule, TaskSchedule
 from cellplan.model.motion.plan import Interval
 from cellplan.model.report.report import ClearanceClass, Report
+from cellplan.model.task.clocked_path import are_within
 from cellplan.model.task.task import Frame
 from cellplan.model.units import DEG, MM
-from cellplan.programs.elements.timed_rows import are_within
 from cellplan.programs.formats.csv import DECIMALS, joint_fields, read_table, time_fields
 
 TIME: Final = "time_s"

@@ -296,7 +296,7 @@ def _processes(export: _Export) -> Iterator[str]:
         if form is None:
             yield f"no statement of a process is written for '{robot}': state controllers.{control.id}.process"
             continue
-        held = dict.fromkeys((form.feed_in(task.name), task.feed) for task in tasks)
+        held = dict.fromkeys((form.feed_in(task.name), task.feed) for task in tasks if task.has_one_feed)
         for data, feed in held:
             if data is not None and feed is not None:
                 yield f"the tool of '{robot}' moves at {MM * feed:g} mm/s if {data} holds it"

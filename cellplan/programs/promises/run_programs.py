@@ -9,10 +9,10 @@ from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.plan import Phase
 from cellplan.model.report.verified_run import AnyRun, UnsolvedRun
+from cellplan.model.task.clocked_path import are_within
 from cellplan.model.task.task import Frame
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.programs.elements.joints import unit_of
-from cellplan.programs.elements.timed_rows import are_within
 from cellplan.runs.plan.program import STILL_TOL
 
 

@@ -29,7 +29,13 @@ def feeds_in_step(
         for phase in phases.work:
             for task in map(phase.cell.task, phase.tasks):
                 rows = program.robots.get(task.robot)
-                if task.feed is None or rows is None or rows.X_PT is None or rows.process is None:
+                if (
+                    task.feed is None
+                    or not task.has_one_feed
+                    or rows is None
+                    or rows.X_PT is None
+                    or rows.process is None
+                ):
                     continue
                 times, clock = times_of(rows), times_of(every.robots[task.robot])[phase.rows]
                 is_on = rows.process[:-1] & (times[:-1] >= clock[0] - SAME_TIME) & (times[1:] <= clock[-1] + SAME_TIME)

@@ -11,8 +11,9 @@ from cellplan.model.motion.motion import JointTable, Piece
 from cellplan.model.motion.plan import Interval, Plan
 from cellplan.model.report.exported import ProgramRows, RobotRows
 from cellplan.model.report.verified_run import VerifiedRun
+from cellplan.model.task.clocked_path import are_within
 from cellplan.model.task.task import TIME_TOLERANCE
-from cellplan.programs.elements.timed_rows import are_near, are_within
+from cellplan.programs.elements.timed_rows import are_near
 from cellplan.programs.rows.interpolant import resting, row_velocities
 
 

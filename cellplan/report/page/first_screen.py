@@ -5,6 +5,7 @@ from typing import Final
 
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.left_out import TITLES, LeftOutKind, left_out_lines
+from cellplan.model.units import MM
 from cellplan.report.page.checks import failure_groups
 from cellplan.report.page.times import page_begin, phase_begins
 from cellplan.report.record.common import Entries, Record
@@ -58,7 +59,7 @@ def _begin_on_page(record: Record, task: Record) -> float | None:
 def _demanded(cell: Cell, name: str) -> str:
     """Feed that the process of a task demands; empty without one."""
     process = next((task.process for task in cell.tasks if task.name == name), None)
-    return "" if process is None else f"{small(process.feed_mm_s)} mm/s ± {small(process.tolerance_percent)} %"
+    return "" if process is None else f"{small(MM * process.feed)} mm/s ± {small(process.tolerance_percent)} %"
 
 
 def not_judged(record: Record) -> list[tuple[str, str]]:

@@ -100,7 +100,9 @@ def _work(task: Task, record: Record, begin: float, end: float) -> Iterator[Span
     if task.settle > 0.0:
         yield Span("settle", "settling: tool errors are not judged", first, first + task.settle)
     if task.process is not None:
-        yield Span("process", f"process of {task.name} on", first, off)
+        ends = [first, *(begin + at for rapid in record.get("process_off_s", ()) for at in rapid), off]
+        for on, until in zip(ends[0::2], ends[1::2], strict=True):
+            yield Span("process", f"process of {task.name} on", on, until)
 
 
 def _ticks(total: float) -> list[float]:

@@ -8,12 +8,11 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.files.run.stored import CLOCK
-from cellplan.geometry.arrays import Array, Flags
+from cellplan.geometry.arrays import Array
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.motion.motion import Clock, ClockTable, JointTable, Motion, Schedule
 from cellplan.model.motion.plan import Hold, Interval, Phase, Plan, rows_of
-from cellplan.model.task.clocked_path import fixed_rests
-from cellplan.model.task.task import TIME_TOLERANCE
+from cellplan.model.task.clocked_path import are_within, fixed_rests
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import TIME_DECIMALS, retimed_schedule, schedule_tasks
 
@@ -110,7 +109,7 @@ class ProgramClock:
             for scheduled in (task for task in schedule.tasks if task.task.name in lengths):
                 lengths[scheduled.task.name][rows] = scheduled.travelled
                 lengths[scheduled.task.name][rows.stop :] = scheduled.travelled[-1]
-        process = {task: _within(self.sigma, self.plan.process[task]) for task in tasks}
+        process = {task: are_within(self.sigma, self.plan.process[task]) for task in tasks}
         return ClockTable(
             times=self.times, sigma=self.sigma, phases=tuple(names), lengths=lengths, process=process, gaps=self.gaps
         )
@@ -184,17 +183,9 @@ def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) 
         begin = phase.begin
         for scheduled in schedule.tasks:
             task = scheduled.task
-            working = (begin + task.start, begin + scheduled.end + task.off_delay)
-            process[task.name] = (*process.get(task.name, ()), working)
+            working = tuple((begin + on, begin + off) for on, off in scheduled.process_on)
+            process[task.name] = (*process.get(task.name, ()), *working)
             stops[task.name] = (*stops.get(task.name, ()), *(begin + stop for stop in scheduled.stops))
-        rests = (rest for path in schedule.paths for rest in fixed_rests(path.task, path.corners))
+        rests = (rest for path in schedule.paths for rest in fixed_rests(path))
         dwells |= {(begin + first, begin + last) for first, last in rests}
     return replace(plan, phases=tuple(phases), stops=stops, process=process, dwells=tuple(sorted(dwells)))
-
-
-def _within(times: Array, stretches: Sequence[tuple[float, float]]) -> Flags:
-    """Whether times in [s], shape (N,), lie in one of some stretches, ends included, shape (N,)."""
-    inside = np.zeros(len(times), dtype=bool)
-    for begin, end in stretches:
-        inside |= (times >= begin - TIME_TOLERANCE) & (times <= end + TIME_TOLERANCE)
-    return inside

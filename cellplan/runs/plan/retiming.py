@@ -259,7 +259,7 @@ class RowLimits:
         within = [
             np.minimum(sigma[1:], end) - np.maximum(sigma[:-1], begin)
             for path in self.paths
-            for begin, end in fixed_rests(path.task, path.corners)
+            for begin, end in fixed_rests(path)
         ]
         return float(np.max(within, initial=0.0) - ROUNDING) / self.step
 
@@ -270,7 +270,7 @@ class RowLimits:
             if path.task.feed is not None:
                 is_moving = (sigma >= path.start) & (sigma <= path.end)
                 share = np.maximum(share, is_moving * travel_speeds(path, sigma) / path.task.feed)
-            for begin, end in fixed_rests(path.task, path.corners):
+            for begin, end in fixed_rests(path):
                 share = np.maximum(share, (sigma >= begin) & (sigma <= end))
         if self.errors is not None:
             share = np.maximum(share, self.errors.steepness(sigma, self.step))
@@ -324,7 +324,7 @@ def fixed_rates(paths: Sequence[ClockedPath]) -> tuple[FixedRate, ...]:
         process = path.task.process
         if process is not None:
             rates.append(FixedRate(begin=path.start, end=path.end, tolerance=process.tolerance))
-        rates += [FixedRate(begin=begin, end=end) for begin, end in fixed_rests(path.task, path.corners)]
+        rates += [FixedRate(begin=begin, end=end) for begin, end in fixed_rests(path)]
     return tuple(rates)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cellplan.model.task.task import TimeLaw, TimeLawKind
-from cellplan.model.task.time_law import advance, peak_rate
+from cellplan.model.task.time_law import advance, peak_rate, reached_at
 
 LAWS = [
     TimeLaw(kind=TimeLawKind.CONSTANT),
@@ -51,3 +51,18 @@ def test_trapezoid_and_quintic_rest_at_both_ends(law: TimeLaw) -> None:
 
 def test_quintic_starts_and_ends_without_acceleration() -> None:
     assert advance(LAWS[-1], np.array([0.0, 1.0])).acceleration.tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("drops", [(1.0, 1.0), (1.0, 0.25), (0.0, 1.0), (0.5, 0.0), (0.0, 0.0), (0.3, 0.8)])
+def test_a_steady_law_between_speeds_is_its_own_integral_and_begins_and_ends_at_them(drops: tuple) -> None:
+    law, tau, ramp = TimeLaw(kind=TimeLawKind.STEADY), np.linspace(0.0, 1.0, 10_001), 0.2
+    every = np.tile(drops, (len(tau), 1))
+    now = advance(law, tau, ramp, every)
+
+    h = tau[1]
+    assert np.abs((now.share[2:] - now.share[:-2]) / (2.0 * h) - now.rate[1:-1]).max() < 1e-5
+    slope = np.abs((now.rate[2:] - now.rate[:-2]) / (2.0 * h) - now.acceleration[1:-1])
+    assert slope.max() < 5e-2  # at the ends of ramps the acceleration has a corner
+    assert (now.share[0], now.share[-1]) == (0.0, pytest.approx(1.0, abs=1e-15))
+    assert now.rate[[0, -1]] / now.rate.max() == pytest.approx(1.0 - np.array(drops))
+    assert np.abs(reached_at(law, now.share, np.full(len(tau), ramp), every) - tau).max() < 1e-7

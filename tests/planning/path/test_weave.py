@@ -129,7 +129,7 @@ def test_offsets_are_smooth_between_the_knots_of_a_weave(form: str) -> None:
 def rows_of(task: Task, step: float) -> tuple[Array, Array, Array]:
     cell = clocked(task, duration=None, step=step)
     (scheduled,) = schedule_tasks(cell, [build_toolpath(task, PLATE)]).tasks
-    ((begin, end),) = scheduled.demanded
+    ((begin, end, _),) = scheduled.demanded
     times = step * np.arange(len(scheduled.X_PT))
     inside = (times >= begin) & (times <= end)
     return times[inside], scheduled.X_PT[inside, :3, 3], scheduled.travelled[inside]

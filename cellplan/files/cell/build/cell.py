@@ -28,10 +28,13 @@ from cellplan.model.cell.cell import Grasp, Mode, MotionSettings, Obstacle, Part
 from cellplan.model.cell.rod import Holder, Rod, tool_body_name
 from cellplan.model.origin import Origin
 from cellplan.model.robot.robot import BASE, Body, JointSum, RobotModel, configuration_in_si
-from cellplan.model.settings.units import Mm, in_si, si_or_none
+from cellplan.model.settings.task import ProcessEntry
+from cellplan.model.settings.units import Mm, MmPerS, in_si, si_or_none
 from cellplan.model.task.task import (
     Frame,
     OffPart,
+    PathSpec,
+    ProgrammedPath,
     Service,
     StraightMove,
     Task,
@@ -39,6 +42,7 @@ from cellplan.model.task.task import (
     TimeLawKind,
     ViaPoint,
 )
+from cellplan.model.units import MM
 
 COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
 PLANE_NORMAL: Final = {"xy": "z", "yz": "x", "xz": "y"}
@@ -142,11 +146,11 @@ def build_task(
 ) -> Task:
     """The task of one operator; settings that it does not state are those of the motion."""
     entry, motion = document.tasks[name], document.motion
-    (tool_axis, tool_x), process = tool_directions(entry), entry.process
+    (tool_axis, tool_x), fields = tool_directions(entry), path_fields(name, document, read_targets)
     return Task(
         name=name,
         robot=entry.robot,
-        **path_fields(name, document, read_targets),
+        **fields,
         tool_axis=None if tool_axis is None else direction(tool_axis),
         tool_x=direction(tool_x),
         spin=entry.spin_deg.si,
@@ -156,14 +160,12 @@ def build_task(
         tolerance=entry.tolerance.filled,
         start=entry.begins_s,
         duration=entry.duration_s,
-        feed=si_or_none(entry.feed_mm_s) if process is None else process.feed_mm_s.si,
-        time_law=_time_law(entry.time_law or motion.time_law) if process is None else TimeLaw(kind=TimeLawKind.STEADY),
+        **_speeds(entry, motion, fields["path"]),
         blend=_blend(entry.corners or motion.corners),
         settle=entry.settle_s,
         repeat=entry.repeat,
         approach=_straight_move(entry.approach_mm, entry.approach_s),
         retract=_straight_move(entry.retract_mm, entry.retract_s),
-        process=process,
         dwell=entry.dwell_s,
         relative_to=Frame(entry.relative_to),
         tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm).si,
@@ -181,12 +183,24 @@ def build_task(
     )
 
 
+def _speeds(entry: TaskEntry, motion: MotionEntry, path: PathSpec) -> dict[str, Any]:
+    """Process, feed and time law of a task, by field; with feeds of a file the process has the greatest of these."""
+    process, feed = entry.process, si_or_none(entry.feed_mm_s)
+    if isinstance(path, ProgrammedPath):
+        process = (process or ProcessEntry()).changed(feed_mm_s=MmPerS(MM * float(path.feeds[-1])))
+        feed = float(path.speeds.max())
+    elif process is not None:
+        feed = process.feed
+    law = _time_law(entry.time_law or motion.time_law) if process is None else TimeLaw(kind=TimeLawKind.STEADY)
+    return {"process": process, "feed": feed, "time_law": law}
+
+
 def _blend(corners: CornerChoice) -> float | None:
     """Distance from a corner at which its rounding begins in [m]; None for a stop."""
     return corners.blend_mm.si if isinstance(corners, BlendEntry) else None
 
 
-def _via_points(via: ViaEntry, model: RobotModel, robot: RobotEntry) -> dict[str, tuple[ViaPoint, ...]]:
+def _via_points(via: ViaEntry, model: RobotModel, robot: RobotEntry) -> dict[str, Any]:
     """What a robot passes before and after a task, by field."""
     stated: dict[object, ViaPoint] = {"home": None, "service": _service(robot.service, model)}
     return {
@@ -222,7 +236,7 @@ def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
     if entry.tool_axis not in {None, "normal"}:
         return entry.tool_axis, entry.tool_x
     path = entry.path
-    if path.is_seam or needs_surface(entry) or path.project is not None or path.csv is not None:
+    if path.is_seam or needs_surface(entry) or path.project is not None or path.file_key is not None:
         return None, entry.tool_x
     shape = path.circle or path.rectangle or path.rhombus or path.polyline
     normal = PLANE_NORMAL[(shape.plane if shape else None) or "xy"]
@@ -247,7 +261,7 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
             entry.setdefault("tool_depth_mm", document.checks.tool_depth_mm)
         if not task.path.is_seam:
             entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
-        if name not in timed:
+        if name not in timed and not task.path.has_feeds:
             if task.process is None:
                 entry.setdefault("time_law", motion["time_law"])
             entry.setdefault("corners", motion["corners"])

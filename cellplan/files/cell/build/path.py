@@ -148,7 +148,7 @@ def is_woven_by_controller(task: TaskEntry, document: CellDocument) -> bool:
 
 def _weave(entry: WeaveEntry, task: TaskEntry) -> Weave:
     """A weave with lengths for its times, at the feed of the process."""
-    feed = 0.0 if task.process is None else task.process.feed_mm_s.si
+    feed = 0.0 if task.process is None else task.process.feed
     return Weave(
         form=WeaveForm(entry.form),
         side=entry.side_mm.si,

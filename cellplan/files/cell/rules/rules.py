@@ -142,7 +142,7 @@ def needs_surface(task: TaskEntry) -> bool:
 
 def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A normal needs a surface; of a file it is known only later whether it brings orientations."""
-    if needs_surface(task) and task.path.project is None and task.path.csv is None:
+    if needs_surface(task) and task.path.project is None and task.path.file_key is None:
         cure = "give tool_axis a direction"
         if task.relative_to == "part":
             cure = f"add project: +z (or another side), or {cure}"
@@ -183,8 +183,10 @@ def _axes(task: TaskEntry, path: SampledPath | TimedPath, document: YamlDocument
     if needs_surface(task) and task.path.project is None and not has_axes:
         project = "" if task.relative_to == "world" else "add project: +z (or another side), "
         text = (
-            "tool_axis: normal requires axes or quaternions in the file, or a path that is projected onto the part: "
-            f"add columns i,j,k, {project}or give tool_axis a direction"
+            "tool_axis: normal requires tool axes in the file: have CAM write them, or give tool_axis a direction"
+            if task.path.has_feeds
+            else "tool_axis: normal requires axes or quaternions in the file, or a path that is projected onto the "
+            f"part: add columns i,j,k, {project}or give tool_axis a direction"
         )
         yield document.finding(("tasks", name, "tool_axis" if task.tool_axis else "path"), text)
 

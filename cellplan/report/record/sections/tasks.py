@@ -86,7 +86,13 @@ class PhaseOfTask(TypedDict, total=False):
     phase: Annotated[str, "phase in which it is worked on, from whose begin its times count"]
 
 
-class TaskRecord(BetweenRowsRecord, DepthRecord, StandoffRecord, DirectionRecord, PhaseOfTask):
+class RapidsRecord(TypedDict, total=False):
+    """Only of a path with rapids."""
+
+    process_off_s: Annotated[list[list[Number]], "begin and end of each rapid move along the path: the process is off"]
+
+
+class TaskRecord(BetweenRowsRecord, DepthRecord, StandoffRecord, DirectionRecord, RapidsRecord, PhaseOfTask):
     """Tool error of a task, desired minus actual, over the components that the task constrains."""
 
     robot: Annotated[str, "the operator"]
@@ -160,6 +166,7 @@ def _task_record(
         "cycles": task.repeat,
         "start_s": number(accuracy.start_s),
         "end_s": number(accuracy.end_s),
+        **_rapids_record(accuracy),
         **_phase_of(report),
         **direction_record(task),
         **between_record(accuracy.between),
@@ -167,6 +174,12 @@ def _task_record(
         **_standoff_record(tip, task),
         "process_speed": _process_record(report.accelerations.process.get(task.name)),
     }
+
+
+def _rapids_record(accuracy: TaskAccuracy) -> RapidsRecord:
+    """When the process of a task is off along its path; nothing where it is on throughout."""
+    off = [[number(begin), number(end)] for begin, end in accuracy.process_off]
+    return {"process_off_s": off} if off else {}
 
 
 def _phase_of(report: Report) -> PhaseOfTask:

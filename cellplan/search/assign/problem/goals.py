@@ -12,7 +12,7 @@ from cellplan.measures.weld_position import torch_angles, weld_angles
 from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.settings.task import TorchEntry, WeldPositionEntry
 from cellplan.model.task.clocked_path import ClockedPath, demanded_spans, fixed_rests
-from cellplan.model.task.task import Service, ViaPoint
+from cellplan.model.task.task import ProgrammedPath, Service, ViaPoint
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths
@@ -131,7 +131,7 @@ def task_goals(cell: Cell, robots: Mapping[str, Sequence[str]]) -> list[TaskGoal
                 robots=able,
                 X_PT=np.concatenate([ends[:1], on_path, ends[1:]]),
                 steps=int(np.ceil(_seconds(cell, clocked[task.name]) / cell.motion.step - 1e-9)),
-                is_reversible=is_reversible(toolpath, on_path),
+                is_reversible=not isinstance(task.path, ProgrammedPath) and is_reversible(toolpath, on_path),
                 after=task.after,
                 torch=task.torch,
                 weld_position=task.weld_position,
@@ -152,9 +152,9 @@ def _seconds(cell: Cell, path: ClockedPath) -> float:
     task = path.task
     if cell.motion.timing is Timing.AS_WRITTEN:
         return path.over
-    rests = sum(end - begin for begin, end in fixed_rests(task, path.corners))
+    rests = sum(end - begin for begin, end in fixed_rests(path))
     if task.process is not None:
-        return rests + sum(end - begin for begin, end in demanded_spans(task, path.corners))
+        return rests + sum(span.end - span.begin for span in demanded_spans(path))
     return rests + (0.0 if task.feed is None else task.repeat * float(path.behind[-1]) / task.feed)
 
 
