@@ -292,13 +292,14 @@ def _clearance_findings(rows: PathRows) -> Iterator[ClearanceFinding]:
         if pair.is_met:
             continue
         first, second = bound.names(pair)
-        sample = min((*pair.touches, *pair.unproved), default=pair.at)
-        at_s = float(np.interp(sample, np.arange(rows.is_break.sum()), rows.times[rows.is_break]))
-        proof = f"are proved to keep {MM * pair.proved:.4g} mm only"
-        if np.isfinite(pair.distance) and pair.distance < pair.demand:
-            proof = f"come as near as {MM * pair.distance:.4g} mm or nearer"
         if pair.touches:
-            proof = "touch"
+            sample, proof = min(pair.touches), "touch"
+        elif np.isfinite(pair.distance) and pair.distance < pair.demand:
+            sample, proof = pair.at, f"come as near as {MM * pair.distance:.4g} mm or nearer"
+        else:
+            begin, proof = bound.edges[np.argmin(pair.low)], f"are proved to keep {MM * pair.proved:.4g} mm only"
+            sample = min((at for at in pair.unproved if at >= begin), default=pair.at)
+        at_s = float(np.interp(sample, np.arange(rows.is_break.sum()), rows.times[rows.is_break]))
         usual = rows.scene.pairs[suspects[pair.row]]
         added = pair.demand - (usual.demand if usual.rule is Rule.CLEARANCE else 0.0)
         wide, cure = "", "let them pass farther apart"
@@ -333,6 +334,13 @@ def place_on_seam(rows: PathRows, task: Task, at_s: float) -> str:
     X_WP = part_poses(rows.scene.cell, rows.scene.chains, q)
     X_PT = relative_to_task_frame(task, rows.scene.chains[task.robot].tool_poses(q[task.robot]), X_WP)
     return f"{MM * np.linalg.norm(np.diff(X_PT[:, :3, 3], axis=0), axis=1).sum():.1f} mm along its seam: "
+
+
+def line_width(rows: PathRows, task: Task, at_s: float | None = None) -> float:
+    """How far joints are off at most while a tool is on lines, in [rad] or [m], or at a time of the phase in [s]."""
+    widths = rows.tubes[task.robot][:, 4:].max(axis=1, initial=0.0)
+    step = slice(None) if at_s is None else min(int(np.searchsorted(rows.times, at_s, side="right")), len(widths)) - 1
+    return float(np.max(widths[step]))
 
 
 def line_steps(rows: PathRows, task: Task) -> Indices:

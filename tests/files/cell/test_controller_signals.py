@@ -1,5 +1,6 @@
 """Signals, tools and bases of a cell file: those that controllers of a kind have, and no others."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -174,6 +175,31 @@ def test_no_handshake_uses_the_output_of_a_process(
         connected(*changes)
 
     assert finding in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "number", "is_right"), [("yaskawa", 3, False), ("yaskawa", 4, True), ("fanuc", 3, True)]
+)
+def test_robots_of_a_yaskawa_controller_share_its_tools_by_number(
+    connected: Load, kind: str, number: int, *, is_right: bool
+) -> None:
+    changes = (
+        ("kind: kuka}", f"kind: {kind}}}"),
+        (LEADS, "{id: c1, group: 1, tool_number: 3}"),
+        (WEIGHTS, f"{WEIGHTS}    controller: {{id: c1, group: 2, tool_number: {number}}}\n"),
+    )
+    if is_right:
+        assert connected(*changes).robot("worker").control.tool_number == number
+        return
+    with pytest.raises(InvalidFileError) as caught:
+        connected(*changes)
+
+    (finding,) = str(caught.value).splitlines()
+    assert finding.endswith(
+        "robots.worker.controller.tool_number: expected another number than robots.holder.controller.tool_number, "
+        "whose tool differs and which 'c1' has once, got 3"
+    )
+    assert re.match(r"c:\d+: ", finding)
 
 
 @pytest.mark.parametrize(("kind", "is_right"), [("yaskawa", False), ("fanuc", True)])

@@ -52,6 +52,7 @@ def control_findings(
             yield from _frames(path, control, entry, uses, document)
             if name in models:
                 yield from _joints((*path, "id"), entry, models[name], document)
+    yield from _tools(valid, document)
     yield from _process_data(valid, document)
     yield from _process_delays(valid, document)
     yield from _process_weaves(valid, document)
@@ -146,6 +147,21 @@ def _frames(
             yield document.finding((*path, "frames", at), f"expected each number once, got {number} twice")
         elif entry.kind == "yaskawa":
             yield from _claim((*path, "frames", at), (control.id, "user frame", str(number)), uses, document)
+
+
+def _tools(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
+    """A Yaskawa controller has one tool of each number, whichever of its robots carries it."""
+    first: dict[tuple[str, int], str] = {}
+    for name, robot in valid.robots.items():
+        control = robot.controller
+        entry = None if control is None else valid.controllers.get(control.id)
+        if control is None or entry is None or entry.kind != "yaskawa" or control.tool_number is None:
+            continue
+        other = first.setdefault((control.id, control.tool_number), name)
+        if valid.robots[other].tool != robot.tool:
+            text = f"expected another number than robots.{other}.controller.tool_number, whose tool differs and which "
+            text += f"'{control.id}' has once, got {control.tool_number}"
+            yield document.finding(("robots", name, "controller", "tool_number"), text)
 
 
 def _used_twice(path: KeyPath, control: RobotControlEntry, uses: Uses, document: YamlDocument) -> Iterator[Finding]:
