@@ -24,6 +24,7 @@ from cellplan.checks.tools.between_checks import (
     with_between,
 )
 from cellplan.checks.tools.conditioning import conditioning
+from cellplan.checks.tools.seam_distances import check_seam_distances
 from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
 from cellplan.checks.tools.tracking import check_accuracy, check_closure
 from cellplan.checks.tools.weld_position import check_arcs, check_weld_positions
@@ -107,7 +108,7 @@ def verify_motion(
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
     arcs, welds = check_arcs(cell, schedule, scene.chains, q), check_weld_positions(schedule, scene.chains, q, X_WP)
     checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
-    checks += [*check_payload(loads), *welds, *arcs]
+    checks += [*check_payload(loads), *welds, *arcs, *check_seam_distances(cell, schedule, scene.chains, q, X_WP)]
     checks += check_transfer_speeds(scene, schedule, uses, q) if moving else []
     return Report(
         cell=cell.name,

@@ -105,6 +105,9 @@ class PathEntry(PathShapeEntry):
     standoff_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_MM)] | None = setting(
         None, "Distance of the tool tip from the path, against the tool's own axis; 0 when absent."
     )
+    rod_from_walls_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_MM)] | None = setting(
+        None, "Least distance of the rod of the tool from the walls, as planes through the path; 0 when absent."
+    )
     side_mm: Shift | None = setting(
         None,
         "Distance of a pass from the path, across the weld face between the walls: positive towards the wall toward, "
@@ -174,7 +177,7 @@ class PathEntry(PathShapeEntry):
     def is_seam(self) -> bool:
         """Whether the tool is held to walls."""
         of_walls = self.walls, self.from_, self.toward
-        distances = self.standoff_mm, self.side_mm, self.out_mm
+        distances = self.standoff_mm, self.side_mm, self.out_mm, self.rod_from_walls_mm
         return any(it is not None for it in (*of_walls, *distances, self.work_deg, self.push_deg, self.drag_deg))
 
     @property

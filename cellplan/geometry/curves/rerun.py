@@ -7,6 +7,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.curves.curve import Curve, Interval, spans_at
 from cellplan.geometry.curves.orientation import Orientation
+from cellplan.geometry.curves.seam_line import SeamLine, SeamPlaces
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,6 +65,19 @@ class RerunCurve:
         old, within, sign = self.rerun.at(u, interval)
         p, dp = self.curve.evaluate(old, within)
         return p, sign * dp
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RerunSeam:
+    """A seam along stretches of its curve, with its own direction; see `SeamPlaces`."""
+
+    seam: SeamPlaces
+    rerun: Rerun
+
+    def line(self, u: Array, interval: Interval) -> SeamLine:
+        """The seam at new parameters."""
+        old, within, _ = self.rerun.at(u, interval)
+        return self.seam.line(old, within)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

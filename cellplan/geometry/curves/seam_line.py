@@ -12,11 +12,12 @@ joint, it points to the left of travel, seen against the normal.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array
+from cellplan.geometry.curves.curve import Interval
 from cellplan.geometry.transforms import cross
 
 FACE_ALIKE: Final = np.sin(np.deg2rad(1.0))  # [-] walls whose normals differ by less than 1 deg across the seam
@@ -49,6 +50,13 @@ class SeamLine:
             raise ValueError(
                 f"seam line '{self.source}': expected vectors at lengths that do not decrease, got {sizes}"
             )
+
+
+class SeamPlaces(Protocol):
+    """A seam along a curve."""
+
+    def line(self, u: Array, interval: Interval) -> SeamLine:
+        """The seam at parameters of the curve, shape (N,), within an interval of it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,6 +12,7 @@ from cellplan.errors import InputError
 from cellplan.geometry.arrays import Flags
 from cellplan.geometry.curves.arc_length import QuickParameters
 from cellplan.geometry.curves.curve import Interval
+from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.geometry.transforms import Array, rotation_about
 from cellplan.model.task.pace import Pace
 from cellplan.model.task.task import TIME_TOLERANCE, Task, TimeLawKind
@@ -213,6 +214,14 @@ def on_line(path: ClockedPath, travelled: Array) -> tuple[Array, Array]:
     s = travelled - toolpath.length * np.clip(travelled // toolpath.length, 0, path.task.repeat - 1)
     points: Array = toolpath.without_weave.poses(s)[:, :3, 3]
     return points, np.zeros_like(points) if toolpath.line is None else toolpath.poses(s)[:, :3, 3] - points
+
+
+def seam_at(path: ClockedPath, travelled: Array) -> SeamLine | None:
+    """The seam at lengths in [m] behind the tool, which grow from cycle to cycle, shape (N,); None without walls."""
+    toolpath = path.toolpath
+    s = travelled - toolpath.length * np.clip(travelled // toolpath.length, 0, path.task.repeat - 1)
+    whole = (float(toolpath.stops[0]), float(toolpath.stops[-1]))
+    return None if toolpath.seam is None else toolpath.seam.line(toolpath.arc.parameters(s, whole), whole)
 
 
 def travel_speeds(path: ClockedPath, times: Array) -> Array:

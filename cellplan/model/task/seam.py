@@ -24,10 +24,12 @@ class Seam:
         walls: Outward unit normals in P by name, shape (3,) each, or where a wall is; none for a seam line, which has
             its own.
         angles: How the tool is held.
+        rod_clearance: Least distance in [m] of a rod from the walls.
     """
 
     walls: Mapping[str, Array | WallPlace]
     angles: SeamAngles
+    rod_clearance: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,6 +9,7 @@ from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.curves.arc_length import ArcLength, QuickParameters
 from cellplan.geometry.curves.curve import Curve
 from cellplan.geometry.curves.orientation import Orientation
+from cellplan.geometry.curves.seam_line import SeamPlaces
 from cellplan.geometry.transforms import pose_from, rotation_about
 
 TOOL_Z: Final = np.array([0.0, 0.0, 1.0])
@@ -32,6 +33,7 @@ class Toolpath:
             times and may stand still.
         bulge: Largest distance in [m] of a smooth curve from the straight lines between its points, before it is
             projected; None for other curves.
+        seam: The seam with its walls by the parameter of the tip curve; None without walls.
         line: Curve that the tip weaves about, along which length and feed are measured; None where it does not weave.
     """
 
@@ -46,6 +48,7 @@ class Toolpath:
     stand_off: float = 0.0
     is_timed: bool = False
     bulge: float | None = None
+    seam: SeamPlaces | None = None
     line: Curve | None = None
 
     def __repr__(self) -> str:

@@ -81,6 +81,7 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
         stand_off=task.approach.distance if task.approach else 0.0,
         is_timed=is_timed,
         bulge=curve.bulge,
+        seam=curve.seam,
     )
     if not is_rigid(toolpath.spread(PROBES)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")

@@ -19,7 +19,7 @@ from cellplan.geometry.curves.curve import (
     straight_sides,
     tangents,
 )
-from cellplan.geometry.curves.seam_line import SeamLine
+from cellplan.geometry.curves.seam_line import SeamLine, SeamPlaces
 from cellplan.geometry.curves.spline import spline_through
 from cellplan.geometry.curves.surface_patch import Patch
 from cellplan.model.task.path_direction import outside_of, plane_axes
@@ -62,6 +62,7 @@ class PathCurve:
     walls: Mapping[str, Curve] = field(
         default_factory=dict
     )  # outward normals of walls that a seam line states, by name
+    seam: SeamPlaces | None = None  # the seam that the tool follows; None without walls
     bulge: float | None = None  # greatest distance in [m] of a smooth curve from its chords, unprojected; else None
 
 

@@ -101,7 +101,8 @@ def follow_seam(task: Task, curve: PathCurve, angles: SeamAngles) -> tuple[PathC
     axes = SeamAxes(curve=curve, task=task, angles=angles)
     _refuse_steep_walls(task, axes)
     _refuse_jumps(task, axes)
-    return (replace(curve, curve=cubic_fit(_TipCurve(axes), tolerance=FIT)) if angles.is_offset else curve), axes
+    tip = cubic_fit(_TipCurve(axes), tolerance=FIT) if angles.is_offset else curve.curve
+    return replace(curve, curve=tip, seam=axes), axes
 
 
 def _normals(vectors: Array) -> Array:

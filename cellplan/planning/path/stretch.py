@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.curves.arc_length import measure
-from cellplan.geometry.curves.rerun import Rerun, RerunCurve
+from cellplan.geometry.curves.rerun import Rerun, RerunCurve, RerunSeam
 from cellplan.model.task.seam import Stretch
 from cellplan.model.task.task import Task
 from cellplan.planning.path.curve import PathCurve
@@ -82,6 +82,7 @@ def along_stretches(path: PathCurve, rerun: Rerun) -> PathCurve:
         given=stops,
         is_closed=path.is_closed and whole,
         runs_on=path.runs_on and whole,
+        seam=None if path.seam is None else RerunSeam(seam=path.seam, rerun=rerun),
         inward=None if path.inward is None else RerunCurve(curve=path.inward, rerun=rerun),
         walls={name: RerunCurve(curve=normals, rerun=rerun) for name, normals in path.walls.items()},
     )

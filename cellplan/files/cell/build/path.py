@@ -124,6 +124,7 @@ def _seam(entry: PathEntry) -> Seam | None:
             out=(entry.out_mm or Mm(0.0)).si,
             toward=entry.toward,
         ),
+        rod_clearance=(entry.rod_from_walls_mm or Mm(0.0)).si,
     )
 
 
