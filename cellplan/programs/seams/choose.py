@@ -359,18 +359,19 @@ def _piece_ends(path: ToolPath, rows: RobotRows, both: tuple[int, int], corners:
 
 
 def _feed(path: ToolPath, rows: RobotRows, between: tuple[int, int, int]) -> float:
-    """Speed of a tool in [m/s] between two rows of a phase: what its task states, or the greatest of the run."""
+    """Speed of a tool in [m/s] between two rows of a phase: what its task states, or the greatest of the run.
+
+    A tool that weaves along its rows has the mean of the run in process, so that it travels at the feed of its task.
+    """
     start, first, last = between
-    if (
-        path.task.feed is not None
-        and path.task.weave is None
-        and rows.process is not None
-        and rows.process[start + first]
-    ):
+    is_on = path.task.feed is not None and rows.process is not None and bool(rows.process[start + first])
+    if is_on and path.task.feed is not None and path.task.weave is None:
         return path.task.feed
     steps = np.linalg.norm(np.diff(path.X_PT[first : last + 1, :3, 3], axis=0), axis=1)
-    speed = float(np.max(steps / np.diff(times_of(rows)[start + first : start + last + 1])))
-    return max(float(np.ceil(speed / FEED_STEP - 1e-6)) * FEED_STEP, SLOWEST)
+    times = np.diff(times_of(rows)[start + first : start + last + 1])
+    if is_on and path.task.weave is not None:
+        return max(round(float(steps.sum() / times.sum()) / FEED_STEP) * FEED_STEP, SLOWEST)
+    return max(float(np.ceil(float(np.max(steps / times)) / FEED_STEP - 1e-6)) * FEED_STEP, SLOWEST)
 
 
 def _cuts(path: ToolPath, pieces: Sequence[Piece]) -> Iterator[float]:
