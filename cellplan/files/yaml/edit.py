@@ -39,7 +39,8 @@ def changed_text(text: str, values: Mapping[str, Any], *, head: str) -> str:
     before = parse_yaml(plain.encode(), file="cell").root
     try:
         edited = edited_text(plain, dict(_changes(before, values, ())))
-        if parse_yaml(edited.encode(), file="cell").root == values:
+        root = parse_yaml(edited.encode(), file="cell").root
+        if root == values and [*root.get("tasks", ())] == [*values.get("tasks", ())]:  # whose order counts
             return top + edited
     except (InputError, KeyError, ValueError):
         pass
@@ -67,7 +68,7 @@ def edited_text(text: str, values: Mapping[KeyPath, object]) -> str:
         else:
             edits.append(_insertion(text, nodes, path, value))
     edits += [(end, end, 1, _comment(text, end, notes)) for end, notes in remarks.items()]
-    for begin, end, _, new in sorted(edits, key=lambda edit: edit[:3], reverse=True):
+    for begin, end, _, new in sorted(edits, key=lambda edit: edit[:3])[::-1]:  # of equal ones the first comes first
         text = text[:begin] + new + text[end:]
     return text
 

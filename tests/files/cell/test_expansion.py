@@ -5,8 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from cellplan.files.cell.expansion import expanded
 from cellplan.files.cell.load import load_cell, load_open_cell
 from cellplan.files.cell.write import render_cell
+from cellplan.files.yaml.edit import changed_text
+from cellplan.files.yaml.reader import read_yaml
 from cellplan.model.cell.cell import Cell
 from cellplan.model.task.seam import Stretch
 
@@ -155,3 +158,14 @@ def test_parts_of_an_open_task_are_open(load: Load, tmp_path: Path) -> None:
 )
 def test_keys_that_make_no_tasks_are_refused(refuse: Refuse, keys: str, message: str) -> None:
     assert message in refuse(seam(keys))
+
+
+@pytest.mark.parametrize("keys", [PASSES, "    tacks: {length_mm: 10, pitch_mm: 95}"])
+def test_file_with_other_values_has_the_parts_in_their_order(tmp_path: Path, load: Load, keys: str) -> None:
+    load(seam(keys))
+    text = (tmp_path / "c").read_text(encoding="utf-8")
+    root = expanded(read_yaml(tmp_path / "c", file="c")).root
+    (tmp_path / "c").write_text(changed_text(text, root, head="best"), encoding="utf-8")
+
+    assert [task.name for task in load_cell("c").tasks] == list(root["tasks"])
+    assert [task.after for task in load_cell("c").tasks][1] == (next(iter(root["tasks"])),)
