@@ -1,6 +1,6 @@
 """Attempts: what is allowed to change at once to make a failing cell pass."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import combinations, islice
@@ -120,6 +120,12 @@ def of_branches(cell: Cell) -> Iterator[Attempt]:
         if robot.start is not None and any(task.robot == robot.name for task in cell.tasks):
             key = "start" if "start" in document[robot.name] else "start_deg"
             yield Attempt(kind=RemedyKind.BRANCH, robots=(robot.name,), values={f"robots.{robot.name}.{key}": "auto"})
+
+
+def of_far_starts(robots: Iterable[str]) -> list[Attempt]:
+    """The attempt with the starts sought anew of robots that begin too far off their tasks; none without any."""
+    names = tuple(dict.fromkeys(robots))
+    return [Attempt(kind=RemedyKind.BRANCH, robots=names)] if names else []
 
 
 def of_weights(cell: Cell, settings: LayoutSettings) -> Iterator[Attempt]:

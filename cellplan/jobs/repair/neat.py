@@ -45,12 +45,19 @@ def changed_values(ready: PreparedSearch, x: Array, start: Array) -> dict[str, o
     written = values_of(ready, x, start)
     document: Any = ready.cell.origin.document
     begun = {} if ready.phases is None else values_of(ready, ready.variables.given, ready.given_start)
+    far = far_starts(ready)
     return {
         address: value
         for address, value in written.items()
         if not _is_same(written_at(document, address), value)
-        and not (address.startswith("tasks.") and _is_same(begun.get(address), value))
+        and not (address not in far and address.startswith("tasks.") and _is_same(begun.get(address), value))
     }
+
+
+def far_starts(ready: PreparedSearch) -> dict[str, str]:
+    """Addresses of the starts of those tasks of a program whose stated starts are too far off, with their robots."""
+    tasks = () if ready.phases is None else ready.phases.work.far
+    return {f"tasks.{name}.{key}": ready.cell.task(name).robot for name in tasks for key in ("start", "start_deg")}
 
 
 def written_at(document: Any, address: str) -> Any:

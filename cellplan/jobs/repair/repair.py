@@ -16,12 +16,14 @@ from cellplan.jobs.repair.attempts import (
     Attempt,
     RemedyKind,
     of_branches,
+    of_far_starts,
     of_layout,
     of_paths,
     of_tools,
     of_weights,
     owners,
 )
+from cellplan.jobs.repair.neat import far_starts
 from cellplan.jobs.repair.prepare import ready_cell, start_posture
 from cellplan.jobs.repair.record import AdviceRecord, Case, Tried, advice_record, failed_checks, remedy_values
 from cellplan.jobs.repair.solved import required_step, required_time
@@ -126,8 +128,10 @@ class _Work:
             self._run([None])
             if self.given.status is TrialStatus.PASSED:
                 return
+            self._run(of_far_starts(far_starts(ready).values()))
         names = {check["name"] for check in failed_checks(self.given)}
         can_help = not seems_sound or bool(names & (JOINT_LIMITS | DISTANCES))  # a search knows of nothing else
+        can_help = can_help or bool(self.tried and not self.remedies)
         self._run([*([] if seems_sound else [None]), *(_first(ready) if can_help else [])])
         sizes = range(2, len(owners(ready.cell, ready.variables.settings)) + 1) if can_help else ()
         for size in sizes:

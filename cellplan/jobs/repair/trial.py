@@ -14,7 +14,7 @@ from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.trials.limits import LimitRecord, standing_of
 from cellplan.jobs.layout.trials.prepared import NOT_FOLLOWED, PreparedSearch
 from cellplan.jobs.repair.attempts import CONTINUOUS, Attempt, RemedyKind
-from cellplan.jobs.repair.neat import changed_values, neat
+from cellplan.jobs.repair.neat import changed_values, far_starts, neat
 from cellplan.jobs.repair.prepare import begins, ready_cell, start_posture, with_attempt
 from cellplan.jobs.repair.solved import SolvedCell, demanded_margin, required_time
 from cellplan.model.cell.cell import Cell
@@ -120,13 +120,13 @@ def _shortfall(ready: PreparedSearch, improved: Improved) -> str:
 
 
 def _of_branch(ready: PreparedSearch, attempt: Attempt) -> Confirmed | str:
-    """The start posture of one robot sought anew, the others as they are."""
+    """The start posture of one robot sought anew, the others as they are; or all that are too far off their tasks."""
     given, reason = start_posture(ready)
     if reason:
         return reason
     cell = ready.cell.with_values(attempt.values)
     start = ready.start_of(cell)
-    if np.abs(start - given).max() < SAME_START:
+    if np.abs(start - given).max() < SAME_START and not far_starts(ready):
         return "the given one is the best that was found"
     point = ready.coarse.evaluate(ready.variables.given, start)
     if point is None:

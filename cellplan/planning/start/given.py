@@ -1,6 +1,7 @@
 """Start postures given in the cell are examined before anything is solved: within limits, tool on the task's start."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -63,16 +64,28 @@ def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
     if not findings:
         relations: list[Relation] = [*cell.closures, *cell.tasks]
         for relation in relations:
-            X_PT = relation.X_PT if isinstance(relation, Grasp) else toolpaths[relation.name].X_PT_start
-            off = _distance(cell, relation, X_PT)
-            may_settle = isinstance(relation, Task) and relation.settle > 0.0  # such a tool may start beside its path
-            if off is not None and not may_settle and is_off(cell, relation, off):
+            if (off := _off(cell, relation, toolpaths)) is not None:
                 error = StartOffGraspError if isinstance(relation, Grasp) else StartOffTaskError
                 findings.append(error(off_words(cell, relation, off)))
     if len(findings) == 1:
         raise findings[0]
     if findings:
         raise InvalidFileError(findings)
+
+
+def without_far_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> Cell:
+    """The cell of one block without the starts that are too far off their tasks; they are missing then."""
+    far = {task.robot for task in cell.tasks if _off(cell, task, toolpaths) is not None}
+    robots = (replace(robot, start=None) if robot.name in far else robot for robot in cell.robots)
+    return replace(cell, robots=tuple(robots))
+
+
+def _off(cell: Cell, relation: Relation, toolpaths: Mapping[str, Toolpath]) -> tuple[float, float] | None:
+    """How far a given start puts a tool from where it is desired, in [m] and [rad]; None where that is allowed."""
+    X_PT = relation.X_PT if isinstance(relation, Grasp) else toolpaths[relation.name].X_PT_start
+    off = _distance(cell, relation, X_PT)
+    may_settle = isinstance(relation, Task) and relation.settle > 0.0  # such a tool may start beside its path
+    return None if off is None or may_settle or not is_off(cell, relation, off) else off
 
 
 def part_pose(cell: Cell, holder_start: Array | None) -> Array | None:

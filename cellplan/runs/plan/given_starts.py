@@ -8,20 +8,26 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.branches import Branches, MovedStart
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.sequence.near_starts import with_approach_starts
-from cellplan.planning.start.given import examine_given_starts
+from cellplan.planning.start.given import examine_given_starts, without_far_starts
 from cellplan.planning.start.seeds import with_seeds
 from cellplan.runs.plan.rounded import with_rounded_starts, with_start
 from cellplan.scene.kinematics.screw_chain import Chains
 
 
 def with_placed_starts(
-    cell: Cell, toolpaths: Mapping[str, Toolpath], chains: Chains, *, near: Branches | None = None
+    cell: Cell,
+    toolpaths: Mapping[str, Toolpath],
+    chains: Chains,
+    *,
+    near: Branches | None = None,
+    drops_far: bool = False,
 ) -> tuple[Cell, tuple[MovedStart, ...]]:
     """The cell of one block with its starts on their tasks, and how far each was moved; missing ones stay missing.
 
     Args:
         cell: The cell as it is while its tasks are worked on.
         near: The run of which the branches are kept, where starts are missing.
+        drops_far: Whether starts too far off their tasks are left out, not refused.
 
     Raises:
         InputError: A start is out of limits, or too far off its task.
@@ -33,6 +39,7 @@ def with_placed_starts(
     if cell.program.is_home_to_home:
         placed = with_approach_starts(placed, chains, toolpaths)
     placed = with_rounded_starts(placed, filled)
+    placed = without_far_starts(placed, toolpaths) if drops_far else placed
     examine_given_starts(placed, toolpaths)
     return placed, moved
 

@@ -67,6 +67,7 @@ class PlannedProgram:
     stages: tuple[PlannedStage, ...]  # in their order: all, each beginning where the one before ends; or with tasks
     remarks: tuple[str, ...]  # notes on starts that were found, where no trial was without fault
     moved: Mapping[str, tuple[MovedStart, ...]]  # how far starts were moved, by the name of the phase
+    far: tuple[str, ...] = ()  # tasks whose stated starts were too far off, so that others were searched for
 
 
 def plan_program(cell: Cell, *, near: Branches | None = None, progress: Progress = silent) -> PlannedProgram:
@@ -80,8 +81,14 @@ def plan_program(cell: Cell, *, near: Branches | None = None, progress: Progress
     return replace(work, stages=tuple(_joined(work.cell, work.scenes, work.stages, progress=progress)))
 
 
-def plan_work(cell: Cell, *, near: Branches | None = None, progress: Progress = silent) -> PlannedProgram:
+def plan_work(
+    cell: Cell, *, near: Branches | None = None, drops_far: bool = False, progress: Progress = silent
+) -> PlannedProgram:
     """Plan the stages with tasks alone, in the cell with all starts and homes; nothing leads from one to the next.
+
+    Args:
+        near: The run of which the branches are kept, where starts are missing.
+        drops_far: Whether starts too far off their tasks are searched for, not refused.
 
     Raises:
         InputError: The tasks cannot be worked with, or in no order.
@@ -93,7 +100,7 @@ def plan_work(cell: Cell, *, near: Branches | None = None, progress: Progress = 
     refuse_hanging_parts(scenes)
     refuse_unnamed_supports(scenes)
     refuse_touching_configurations(scenes.held)
-    search = WorkedStages(cell, scenes, progress, near)
+    search = WorkedStages(cell, scenes, progress, near, drops_far=drops_far)
     runs = search.runs()
     started = search.cell
     at_home = _everyone_at_home(started, runs[0])
@@ -108,7 +115,12 @@ def plan_work(cell: Cell, *, near: Branches | None = None, progress: Progress = 
     worked_on = [stage for stage in program_stages(solved) if stage.phase.tasks]
     stages = (_worked(scenes, stage, run) for stage, run in zip(worked_on, runs, strict=True))
     return PlannedProgram(
-        cell=solved, scenes=scenes, stages=tuple(stages), remarks=tuple(search.remarks), moved=search.moved
+        cell=solved,
+        scenes=scenes,
+        stages=tuple(stages),
+        remarks=tuple(search.remarks),
+        moved=search.moved,
+        far=tuple(search.far),
     )
 
 
@@ -140,10 +152,14 @@ class WorkedStages:
         cell: The cell with the starts that were found so far.
         remarks: Notes on starts without a faultless trial.
         moved: How far starts were moved, by the name of the phase.
+        far: Tasks whose stated starts were too far off, so that others were searched for.
     """
 
-    def __init__(self, cell: Cell, scenes: StageScenes, progress: Progress, near: Branches | None) -> None:
-        """Begin with the cell as it was written."""
+    def __init__(
+        self, cell: Cell, scenes: StageScenes, progress: Progress, near: Branches | None, *, drops_far: bool = False
+    ) -> None:
+        """Begin with the cell as it was written; see ``plan_work``."""
+        self._drops_far, self.far = drops_far, list[str]()
         self.moved, self._near = dict[str, tuple[MovedStart, ...]](), near
         self.cell, self.remarks, self._given = cell, list[str](), cell
         self._scenes, self._progress, self._last = scenes, progress, dict[str, Array]()
@@ -169,7 +185,10 @@ class WorkedStages:
         scene = replace(self._scenes.of_stage(stage), cell=cell)
         toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
         paths = clock_paths(cell, toolpaths.values())
-        cell, moved = with_placed_starts(cell, toolpaths, scene.chains, near=self._near)
+        drops = self._drops_far
+        stated = [task for task in cell.tasks if cell.robot(task.robot).start is not None]
+        cell, moved = with_placed_starts(cell, toolpaths, scene.chains, near=self._near, drops_far=drops)
+        self.far += [task.name for task in stated if cell.robot(task.robot).start is None]
         scene = replace(scene, cell=cell)
         start = near_start(scene, paths, self._last) if self._last else None
         if start is None:

@@ -56,6 +56,20 @@ def test_a_program_is_repaired_by_the_robot_that_misses_the_demand() -> None:
     assert failed["message"].startswith("work-1: joint kuka/B2 stays 19.03 deg")
 
 
+@pytest.mark.slow
+def test_starts_off_their_tasks_are_sought_anew_and_nothing_else_changes(tmp_path: Path) -> None:
+    """As where a base was moved and the starts that the cell states were not."""
+    settings = ("robots.kuka.base.z_mm=400",)
+
+    outcome = repair(LayoutRequest(cell=CELL, objective=Objective.CHANGE, settings=settings))
+
+    (remedy,) = outcome.record["remedies"]
+    assert (outcome.record["status"], remedy["text"]) == ("repaired", "another start branch of kuka")
+    assert set(remedy["settings"]) == {HEIGHT, "tasks.circle.start_deg"}
+    assert outcome.best is not None
+    assert solve(outcome.best).passed
+
+
 def test_work_that_cannot_begin_is_one_line_that_leads_to_the_map(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

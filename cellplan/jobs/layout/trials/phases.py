@@ -50,7 +50,7 @@ class ProgramPhases:
         Raises:
             NoSolutionError: A phase has no start, or a tool loses its path.
         """
-        return cls.of_work(plan_work(cell), variables, bodies)
+        return cls.of_work(plan_work(cell, drops_far=True), variables, bodies)
 
     @classmethod
     def of_work(cls, work: PlannedProgram, variables: Variables, bodies: CellDistances) -> "ProgramPhases":

@@ -158,7 +158,7 @@ class PreparedSearch:
     def start_of(self, cell: Cell) -> Array:
         """The start posture of a cell with this job; see ``given_start``."""
         if self.phases is not None:
-            return starts_of(plan_work(cell))
+            return starts_of(plan_work(cell, drops_far=True))
         if all(robot.start is not None for robot in cell.robots):
             return np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
         scene = self.scene if cell is self.variables.base else Scene.from_cell(cell)

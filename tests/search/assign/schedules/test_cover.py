@@ -111,7 +111,7 @@ def test_tasks_in_order_and_of_one_robot_share_no_block_and_those_together_all_d
 @pytest.mark.parametrize("seed", range(4))
 def test_no_program_of_tasks_one_after_the_other_is_shorter_than_all_of_them(seed: int) -> None:
     pytest.importorskip("ortools")
-    instance = small_instance(seed, 5)
+    instance = small_instance(seed, 4)
     names = instance.tasks
     in_turn = {
         name: replace(goal, after=names[:place][-1:]) for place, (name, goal) in enumerate(instance.goals.items())
