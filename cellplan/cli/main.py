@@ -20,6 +20,7 @@ from cellplan.cli.begin.explain import explain
 from cellplan.cli.begin.init import init
 from cellplan.cli.begin.robots import robots
 from cellplan.cli.begin.schema import schema
+from cellplan.cli.begin.seams import seams
 from cellplan.cli.command import Work, as_command
 from cellplan.cli.improve.assign import assign
 from cellplan.cli.improve.base_map import base_map
@@ -79,6 +80,7 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
         "cellplan recover outputs/cell --at 1.32 --cell cell.yaml",
         "cellplan recover outputs/cell --at 1.32 --frozen kuka@1.30 --without-cell",
     ),
+    "seams": ("cellplan seams frame.step --fillets", "cellplan seams frame.step --gap-mm 1 -o frame-seams.html"),
     "robots": ("cellplan robots kuka_kr16_2", "cellplan robots arm.urdf --flange tool0"),
 }  # by command; each is understood
 
@@ -127,7 +129,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": WIDEST},
 )
 COMMANDS: Final[dict[str, dict[str, Work]]] = {
-    "Begin": {"init": init, "robots": robots, "check": check, "explain": explain, "schema": schema},
+    "Begin": {"init": init, "robots": robots, "seams": seams, "check": check, "explain": explain, "schema": schema},
     "Solve": {"solve": solve, "view": view, "floorplan": floor_plan, "verify": verify, "export": export},
     "Improve": {
         "assign": assign,

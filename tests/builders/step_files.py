@@ -6,7 +6,9 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCone, BRepPrimAPI_MakeCylinder
 from OCP.gp import gp_Ax2, gp_Dir, gp_Mat, gp_Pnt, gp_Quaternion, gp_Trsf, gp_Vec
 from OCP.Interface import Interface_Static
 from OCP.Message import Message
@@ -15,11 +17,12 @@ from OCP.STEPControl import STEPControl_AsIs
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
-from OCP.TopExp import TopExp_Explorer
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+from cellplan.geometry.step.kernel import explored
 
 UNITS = {"MM": 1.0, "CM": 10.0, "M": 1000.0, "INCH": 25.4, "FT": 304.8}  # [mm]
 
@@ -41,6 +44,21 @@ def box(low: Sequence[float], high: Sequence[float]) -> Any:
 def cylinder(radius: float, length: float, at: Sequence[float] = (0, 0, 0), along: Sequence[float] = (0, 0, 1)) -> Any:
     """A cylinder in [mm] that begins at a point."""
     return BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(*at), gp_Dir(*along)), radius, length).Shape()
+
+
+def frustum(low: float, high: float, length: float, along: Sequence[float] = (0, 0, 1)) -> Any:
+    """A cone without its tip, from one radius to another in [mm], that begins at the origin."""
+    return BRepPrimAPI_MakeCone(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(*along)), low, high, length).Shape()
+
+
+def cut(shape: Any, tool: Any) -> Any:
+    """A solid without another one."""
+    return next(explored(BRepAlgoAPI_Cut(shape, tool).Shape(), TopAbs_SOLID))
+
+
+def moved(shape: Any, X: np.ndarray) -> Any:
+    """A solid at a pose in [mm]."""
+    return BRepBuilderAPI_Transform(shape, placed(X).Transformation(), True).Shape()
 
 
 def placed(X: np.ndarray) -> Any:
@@ -83,11 +101,9 @@ def write_step(path: Path, parts: Sequence[Named], *, poses: Sequence[np.ndarray
 def distinct(shape: Any, kind: Any) -> list[Any]:
     """Edges or faces of a shape, each once."""
     shapes: list[Any] = []
-    explorer = TopExp_Explorer(shape, kind)
-    while explorer.More():
-        if not any(explorer.Current().IsSame(other) for other in shapes):
-            shapes.append(explorer.Current())
-        explorer.Next()
+    for part in explored(shape, kind):
+        if not any(part.IsSame(other) for other in shapes):
+            shapes.append(part)
     cast = TopoDS.Edge if kind == TopAbs_EDGE else TopoDS.Face
     return [cast(it) for it in shapes]
 

@@ -31,6 +31,7 @@ COMMANDS = (
     "map",
     "rehearse",
     "robots",
+    "seams",
     "schema",
     "solve",
     "sweep",

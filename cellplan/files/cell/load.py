@@ -37,7 +37,7 @@ from cellplan.files.cell.rules.program_rules import posture_findings, program_fi
 from cellplan.files.cell.rules.rules import Targets, rule_findings, target_findings
 from cellplan.files.cell.rules.solver_rules import solver_findings
 from cellplan.files.cell.rules.task_rules import task_rule_findings
-from cellplan.files.cell.step_parts import read_part
+from cellplan.files.cell.step_parts import edge_lines, read_part
 from cellplan.files.cell.user_folders import user_folders
 from cellplan.files.input.files import AllowedFolders
 from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, key_text, raise_findings, shown
@@ -224,13 +224,13 @@ def _models(valid: ValidEntries, document: YamlDocument, sources: Sources) -> di
 
 
 def _targets(valid: ValidEntries, sources: Sources) -> Targets:
-    """Tool targets from files, by task."""
+    """Tool targets from files, and lines along edges of the part, by task."""
     samples = {
         name: sources.targets(task.path, ("tasks", name, "path"))
         for name, task in valid.tasks.items()
         if task.path.file_key is not None
     }
-    return {name: sampled for name, sampled in samples.items() if sampled is not None}
+    return {name: path for name, path in samples.items() if path is not None} | edge_lines(valid, sources)
 
 
 def _unknown_bodies(valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:

@@ -1,23 +1,29 @@
-"""Parts from STEP files, read in the child process; those that were read last are not read again."""
+"""Parts from STEP files, and paths along their edges; read in the child process, and what was read last not again."""
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar, cast
 
 from cellplan.errors import InputError
 from cellplan.files.cell.referenced_files import Sources
 from cellplan.files.input.files import digest_of_file
-from cellplan.files.input.findings import KeyPath, key_text
+from cellplan.files.input.findings import KeyPath, did_you_mean, key_text, shown
 from cellplan.files.schema.partial import ValidEntries
+from cellplan.files.schema.seam import PathEntry
 from cellplan.files.schema.shapes import StepEntry
+from cellplan.geometry.curves.seam_line import SeamLine
+from cellplan.geometry.step.drawing import StepDrawing, read_drawing
 from cellplan.geometry.step.kernel import require_step
+from cellplan.geometry.step.lines import chain, started_near
 from cellplan.geometry.step.part import StepPart, read_step_part
 from cellplan.geometry.step.reader import UnknownShapeError
 from cellplan.guard import Guard, in_child
+from cellplan.model.settings.units import in_si
 
+Value = TypeVar("Value", StepPart, StepDrawing)
 MEGABYTES: Final = 3000  # of which OpenCASCADE alone takes some hundreds
-MOST_PARTS: Final = 8  # that this process holds
-_PARTS: Final[dict[Hashable, StepPart]] = {}
+MOST_READ: Final = 16  # results that this process holds
+_READ: Final[dict[Hashable, StepPart | StepDrawing]] = {}
 
 
 def read_part(valid: ValidEntries, sources: Sources) -> StepPart | None:
@@ -45,13 +51,82 @@ def load_step_part(place: Path, entry: StepEntry) -> tuple[StepPart, str]:
     Raises:
         InputError: The extra ``step`` is not installed, or the file cannot be read; see `read_step_part`.
     """
-    require_step(entry.file)
-    digest = digest_of_file(place, file=entry.file)
-    key = (digest, *entry.model_dump().values())
-    if key not in _PARTS:
-        guard = Guard(file=entry.file, worker="the STEP reader", megabytes=MEGABYTES)
-        part = in_child(read_step_part, place, entry.file, entry.shape, entry.deviation_mm.si, guard=guard)
-        while len(_PARTS) >= MOST_PARTS:
-            del _PARTS[next(iter(_PARTS))]
-        _PARTS[key] = part
-    return _PARTS[key], digest
+    return _read(read_step_part, place, entry.file, entry.shape, entry.deviation_mm.si)
+
+
+def load_drawing(place: Path, file: str, shape: str | None, gap: float) -> StepDrawing:
+    """Edges, seams and faces of a STEP file; see `read_drawing`.
+
+    Raises:
+        InputError: The extra ``step`` is not installed, or the file cannot be read.
+    """
+    return _read(read_drawing, place, file, shape, gap)[0]
+
+
+def _read(read: Callable[..., Value], place: Path, file: str, shape: str | None, size: float) -> tuple[Value, str]:
+    """What a function reads of a STEP file, and the SHA-256 of the file; what was read last is not read again."""
+    require_step(file)
+    digest = digest_of_file(place, file=file)
+    key = (read, digest, file, shape, size)
+    if key not in _READ:
+        guard = Guard(file=file, worker="the STEP reader", megabytes=MEGABYTES)
+        content = in_child(read, place, file, shape, size, guard=guard)
+        while len(_READ) >= MOST_READ:
+            del _READ[next(iter(_READ))]
+        _READ[key] = content
+    return cast("Value", _READ[key]), digest
+
+
+def edge_lines(valid: ValidEntries, sources: Sources) -> dict[str, SeamLine]:
+    """Lines of the tasks whose path runs along edges of the part, by task; findings about the others."""
+    tasks = {name: task.path for name, task in valid.tasks.items() if task.path.is_edge}
+    if not tasks or valid.part is None:
+        return {}
+    entry, lines = valid.part.step, {}
+    place = None if entry is None else sources.file(entry.file, ("part", "step", "file"))
+    try:
+        drawing = load_drawing(place, entry.file, entry.shape, entry.gap_mm.si) if entry and place else None
+    except InputError:
+        return {}  # the part itself says why
+    for name, path in tasks.items():
+        place_of: KeyPath = ("tasks", name, "path")
+        try:
+            if entry is None or drawing is not None:
+                lines[name] = edge_line(path, drawing)
+        except _EdgeError as error:
+            sources.findings.append(sources.document.finding((*place_of, *error.path), str(error)))
+    return lines
+
+
+def edge_line(path: PathEntry, drawing: StepDrawing | None) -> SeamLine:
+    """The line of a path along edges: chained, turned round, begun and cut as the path says."""
+    if drawing is None:
+        raise _EdgeError("edge" if path.edge else "edges", "expected a part from a STEP file (part.step)")
+    names = path.edges or (path.edge or "",)
+    edges = [drawing.edge(name) for name in names]
+    key = "edge" if path.edge is not None else "edges"
+    for place, (name, edge) in enumerate(zip(names, edges, strict=True)):
+        if edge is None:
+            text = f"expected an edge or seam of the STEP file, got {shown(name)}"
+            known = did_you_mean(name, [edge.name for edge in drawing.edges])
+            raise _EdgeError(key, f"{text}{known}; cellplan seams lists them", *([place] if path.edges else []))
+    line = chain([edge.line for edge in edges if edge is not None])
+    if isinstance(line, int):
+        text = f"expected an edge that begins where {shown(names[line - 1])} ends, got {shown(names[line])}"
+        raise _EdgeError(key, text, line)
+    if path.start_at_mm is not None:
+        if not line.is_closed:
+            raise _EdgeError("start_at_mm", "unexpected key, only edges that are closed begin anywhere; use from_mm")
+        line = started_near(line, in_si(path.start_at_mm))
+    for wall_key, wall in (("from", path.from_), ("toward", path.toward)):
+        if wall is not None and wall not in line.walls:
+            raise _EdgeError(wall_key, f"expected one of the walls {' and '.join(line.walls)}, got {shown(wall)}")
+    return line
+
+
+class _EdgeError(InputError):
+    """What is wrong with a path along edges, and the keys below the path that say so."""
+
+    def __init__(self, key: str, text: str, *further: int) -> None:
+        super().__init__(text)
+        self.path: KeyPath = (key, *further)

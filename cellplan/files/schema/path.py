@@ -9,6 +9,7 @@ from cellplan.model.settings.entry import (
     FARTHEST_MM,
     Angle,
     Coordinate,
+    Coordinates,
     Direction,
     Entry,
     OneOf,
@@ -29,6 +30,7 @@ SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direct
 CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
 CAM_WORDS: Final = "a file name or {file: part.apt, transfer_mm_s: 250}"
 OF_FILES: Final = ("csv", "apt", "gcode")
+MOST_EDGES: Final = 50  # in one path
 MOST_JOINED_MM: Final = 1.0  # points farther apart than this are two points of a path
 
 
@@ -126,12 +128,24 @@ GcodeChoice = Annotated[
 class PathShapeEntry(OneOf):
     """Exactly one path, and its projection onto the part."""
 
-    alternatives: ClassVar[tuple[str, ...]] = ("circle", "rectangle", "rhombus", "polyline", *OF_FILES)
+    alternatives: ClassVar[tuple[str, ...]] = ("circle", "rectangle", "rhombus", "polyline", "edge", "edges", *OF_FILES)
 
     circle: CircleEntry | None = setting(None, "Circle.")
     rectangle: RectangleEntry | None = setting(None, "Rectangle.")
     rhombus: RhombusEntry | None = setting(None, "Rhombus.")
     polyline: PolylineEntry | None = setting(None, "Points joined by straight sides.")
+    edge: Text | None = setting(
+        None, "Edge or seam of the STEP file of the part (`part.step`) by name; `cellplan seams` lists them."
+    )
+    edges: tuple[Text, ...] | None = setting(
+        None,
+        "Edges or seams that meet end to end, as one path in this order. Where they meet at an angle it has a corner.",
+        min_length=2,
+        max_length=MOST_EDGES,
+    )
+    start_at_mm: Coordinates | None = setting(
+        None, "Point in the part frame; edges that are closed begin where they are nearest to it."
+    )
     csv: CsvChoice | None = setting(None, "Tool targets from a file.")
     apt: CamChoice | None = setting(None, "Tool targets, feeds and rapids from a file of APT or CLDATA.")
     gcode: GcodeChoice | None = setting(
@@ -155,12 +169,16 @@ class PathShapeEntry(OneOf):
             raise rule("unexpected key, a projected path lies on the surface", "offset_mm")
         if self.has_feeds and self.project is not None:
             raise rule("unexpected key, a path of CAM is used as it stands in the file", "project")
+        if self.is_edge and self.project is not None:
+            raise rule("unexpected key, edges lie on the part already", "project")
+        if not self.is_edge and self.start_at_mm is not None:
+            raise rule("unexpected key, only edges that are closed begin anywhere", "start_at_mm")
         return self
 
     @property
     def is_planar(self) -> bool:
         """Whether the path is drawn in a plane of the part frame."""
-        return self.polyline.plane is not None if self.polyline is not None else self.file_key is None
+        return self.polyline.plane is not None if self.polyline is not None else not (self.file_key or self.is_edge)
 
     @property
     def file_key(self) -> str | None:
@@ -171,6 +189,11 @@ class PathShapeEntry(OneOf):
     def has_feeds(self) -> bool:
         """Whether the file of the path states feeds."""
         return self.apt is not None or self.gcode is not None
+
+    @property
+    def is_edge(self) -> bool:
+        """Whether it runs along edges of the STEP file of the part."""
+        return self.edge is not None or self.edges is not None
 
 
 class JointPathEntry(Entry):

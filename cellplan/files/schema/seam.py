@@ -94,7 +94,8 @@ class PathEntry(PathShapeEntry):
         None,
         "Work angle: between the tool and the perpendicular to the wall under from, across the seam, towards the open "
         "side, away from the other wall: 45 for a fillet, 0 for a butt joint. Beside one wall, or two that face alike, "
-        "it is positive to the left of travel, seen against the normal. 0 when absent and another angle is given.",
+        "it is positive to the left of travel, seen against the normal. 0 when absent and another angle is given; "
+        "halfway between both walls along edges.",
     )
     push_deg: TravelAngle | None = setting(
         None,
@@ -134,6 +135,9 @@ class PathEntry(PathShapeEntry):
         """Angles have walls, walls have angles, and one of the walls is what the work angle is measured from."""
         if self.push_deg is not None and self.drag_deg is not None:
             raise rule("expected either push_deg or drag_deg, got both", "drag_deg")
+        if self.is_edge:
+            self._require_no_walls()
+            return self
         if not self.is_seam:
             return self
         names = self.wall_names
@@ -164,6 +168,18 @@ class PathEntry(PathShapeEntry):
         if self.overlap_mm is not None and (self.from_mm is not None or self.to_mm is not None):
             raise rule("unexpected key beside from_mm and to_mm: a part of a path has two ends", "overlap_mm")
         return self
+
+    def _require_no_walls(self) -> None:
+        """Edges have the walls of their file; a work angle is measured from one of them."""
+        if self.walls is not None:
+            raise rule("unexpected key, edges have the walls of the STEP file", "walls")
+        if self.work_deg is not None and self.from_ is None:
+            text = (
+                "missing, expected the wall that work_deg is measured from, by its name in the list of cellplan seams"
+            )
+            raise rule(text, "from")
+        if self.from_ is not None and self.work_deg is None:
+            raise rule("missing, expected the angle from the wall under from; leave both out for halfway", "work_deg")
 
     @property
     def seam_keys(self) -> tuple[str, ...]:

@@ -126,6 +126,9 @@ class StepEntry(Entry):
         "Largest distance of the mesh from the surfaces of the file. The mesh stands for the part where distances are "
         "measured and in pictures; its deviation counts as the accuracy of bodies does (`checks.body_accuracy`).",
     )
+    gap_mm: Annotated[Mm, Within(ge=0.0, le=5.0)] = setting(
+        Mm(0.0), "Fit-up: solids that are no farther apart than this are joined by seams, which paths may follow."
+    )
 
 
 class ToolShapeEntry(OneShape):

@@ -282,8 +282,10 @@ class TaskEntry(Entry):
                 raise rule("unexpected key, process decides how fast the tool moves along its path", key)
         if not self.path.has_feeds and self.process is not None and self.process.feed_mm_s is None:
             raise rule("missing, expected the demanded feed, a number above 0 in mm/s", "process.feed_mm_s")
-        if self.relative_to == "world" and self.path.project is not None:
-            raise rule("unexpected key, a path in the world is not projected onto the part", "path.project")
+        if self.relative_to == "world" and (self.path.project is not None or self.path.is_edge):
+            key = "path.project" if self.path.project is not None else "relative_to"
+            projected = "unexpected key, a path in the world is not projected onto the part"
+            raise rule("expected part for edges of the part, got world" if self.path.is_edge else projected, key)
         if self.path.is_seam and self.tool_axis is not None:
             raise rule("unexpected key, the walls and angles of the path say how the tool is held", "tool_axis")
         if self.start_deg is not None and self.start is not None:

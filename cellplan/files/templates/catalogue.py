@@ -39,6 +39,15 @@ The cell states its controller, so that its programs can be written in the langu
 cellplan export outputs/multimove --format rapid --cell cell.yaml
 ```"""
 
+STEP_FILE: Final = """\
+The part is `step/frame.step`. Its seams, tasks to paste and a 3-D page with their names:
+
+```sh
+cellplan seams step/frame.step --fillets -o frame-seams.html
+```
+
+It needs the extra `step`: `pip install 'cellplan[step]'`."""
+
 # fmt: off
 TEMPLATES: Final = (  # name, summary, setting, meaning
     Template("two-robots", "one robot holds a plate, the other draws a ring on it; a line for every choice",
@@ -69,6 +78,8 @@ TEMPLATES: Final = (  # name, summary, setting, meaning
              "motion.duration_s=5", "a calmer cycle"),
     Template("multimove", "two arms and a positioner on one controller, which programs them in step (RAPID)",
              "motion.duration_s=8", "a calmer cycle", more=MULTIMOVE),
+    Template("step-frame", "two arms weld a frame from a STEP file on a turntable: eight seams by name",
+             "tasks.left_inside.process.feed_mm_s=18", "a slower seam", files=("step/frame.step",), more=STEP_FILE),
 )
 # fmt: on
 FIRST: Final = TEMPLATES[0].name

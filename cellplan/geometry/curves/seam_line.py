@@ -64,7 +64,8 @@ class SeamAngles:
     """How a tool is held along a seam."""
 
     face: str  # name of the wall that the work angle is measured from
-    work: float = 0.0  # work angle in [rad] from the perpendicular to this wall towards the open side
+    # work angle in [rad] from the perpendicular to this wall towards the open side; None for halfway between two walls
+    work: float | None = 0.0
     travel: float = 0.0  # travel angle in [rad] from the perpendicular to the seam: positive to push, negative to drag
     standoff: float = 0.0  # distance in [m] of the tip from the seam, against the axis of the tool
     side: float = 0.0  # distance in [m] of a pass from the seam across the weld face, towards a wall
@@ -98,8 +99,11 @@ def cross_section(line: SeamLine, face: str, *, is_mirrored: bool = False) -> Cr
 
 def tool_axes(line: SeamLine, angles: SeamAngles) -> Array:
     """Unit tool axes into the part at each point of a seam, shape (N, 3), expressed in P."""
-    section = cross_section(line, angles.face, is_mirrored=angles.is_mirrored)
-    out = np.cos(angles.work) * section.normal + np.sin(angles.work) * section.open_side
+    if angles.work is None:
+        out, _ = weld_face(line, angles)
+    else:
+        section = cross_section(line, angles.face, is_mirrored=angles.is_mirrored)
+        out = np.cos(angles.work) * section.normal + np.sin(angles.work) * section.open_side
     return -np.cos(angles.travel) * out + np.sin(angles.travel) * line.tangents
 
 

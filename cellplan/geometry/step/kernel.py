@@ -4,6 +4,7 @@ Lengths are in [m] outside of this file and in [mm] inside it, as OpenCASCADE re
 """
 
 from collections.abc import Iterator
+from functools import cached_property
 from importlib.util import find_spec
 from itertools import pairwise
 from typing import Any, Final
@@ -16,6 +17,7 @@ from cellplan.geometry.arrays import Array, Flags, Indices
 MM: Final = 1e3  # [mm/m]
 ON_FACE: Final = 1e-5  # [mm] a point this near to the border of a face is on it
 NO_STEP: Final = "expected the package cadquery-ocp-novtk, got none: pip install 'cellplan[step]'"
+SPREAD: Final = 9  # points of an edge that stand for it
 LENGTH_TOL: Final = 1e-9  # [mm] of the length of a curve
 FACET_ANGLE: Final = 0.35  # [rad] between neighbouring facets: a small hole stays round
 SURFACES: Final = ("plane", "cylinder", "cone", "sphere", "torus", "spline", "spline", "revolution", "extrusion")
@@ -46,8 +48,9 @@ class Face:
         self._analysis = ShapeAnalysis_Surface(self._surface)
         self._border = IntTools_FClass2d(shape, ON_FACE)
         self._sign = -1.0 if shape.Orientation() == TopAbs_REVERSED else 1.0
+        self._plane = _plane(BRepAdaptor_Surface(shape)) if self.kind == "plane" else None
 
-    @property
+    @cached_property
     def area(self) -> float:
         """Area in [m^2]."""
         from OCP.BRepGProp import BRepGProp
@@ -61,6 +64,11 @@ class Face:
         """Parameters, shape (N, 2), nearest points on the whole surface and outward normals there, shape (N, 3)."""
         from OCP.gp import gp_Pnt
 
+        if self._plane is not None:
+            origin, axes = self._plane[0], self._plane[1:]
+            uv = MM * (points - origin) @ axes[:2].T
+            feet = points - np.outer((points - origin) @ axes[2], axes[2])
+            return uv, feet, np.tile(self._sign * axes[2], (len(points), 1))
         uv = np.empty((len(points), 2))
         for index, (x, y, z) in enumerate(MM * points):
             place = self._analysis.ValueOfUV(gp_Pnt(x, y, z), 1e-7)
@@ -178,6 +186,11 @@ class Solid:
             is_near[index] = self._classifier.State() != TopAbs_OUT
         return is_near
 
+    @cached_property
+    def corners(self) -> Array:
+        """Points in [m] spread over all edges, their ends included, shape (N, 3)."""
+        return np.concatenate([edge.at(np.linspace(*edge.span, SPREAD))[0] for edge in self.edges])
+
     @property
     def is_sound(self) -> bool:
         """Whether the library finds its topology and geometry in order, and it encloses a volume."""
@@ -237,6 +250,14 @@ def _deviation(face: Face, corners: Array, uv: Array, indices: Indices, likely: 
     if np.any(far):
         off[far] = np.linalg.norm(middles[far] - face.project(middles[far])[1], axis=1)
     return float(off.max())
+
+
+def _plane(surface: Any) -> Array:
+    """Origin in [m], both axes and the normal of the parameters of a plane, shape (4, 3)."""
+    place = surface.Plane().Position()
+    origin, x, y = place.Location(), place.XDirection(), place.YDirection()
+    axes = np.array([[d.X(), d.Y(), d.Z()] for d in (x, y)])
+    return np.array([[origin.X() / MM, origin.Y() / MM, origin.Z() / MM], *axes, np.cross(*axes)])
 
 
 def explored(shape: Any, kind: Any) -> Iterator[Any]:

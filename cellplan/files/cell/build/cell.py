@@ -236,7 +236,8 @@ def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
     if entry.tool_axis not in {None, "normal"}:
         return entry.tool_axis, entry.tool_x
     path = entry.path
-    if path.is_seam or needs_surface(entry) or path.project is not None or path.file_key is not None:
+    is_given = path.project is not None or path.file_key is not None or path.is_edge
+    if path.is_seam or is_given or needs_surface(entry):
         return None, entry.tool_x
     shape = path.circle or path.rectangle or path.rhombus or path.polyline
     normal = PLANE_NORMAL[(shape.plane if shape else None) or "xy"]

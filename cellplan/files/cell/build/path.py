@@ -12,7 +12,7 @@ from cellplan.files.schema.seam import SURFACE, PathEntry, WeaveEntry
 from cellplan.files.schema.task import TaskEntry
 from cellplan.files.shapes import direction
 from cellplan.geometry.arrays import Array
-from cellplan.geometry.curves.seam_line import SeamAngles
+from cellplan.geometry.curves.seam_line import SeamAngles, SeamLine
 from cellplan.model.settings.units import Deg, Mm, si_or_none
 from cellplan.model.task.seam import Seam, Stretch, WallPlace, Weave, WeaveForm
 from cellplan.model.task.task import (
@@ -26,7 +26,7 @@ from cellplan.model.task.task import (
     TimedPath,
 )
 
-TargetReader = Callable[[str], SampledPath | TimedPath]  # name of the task -> its file, read
+TargetReader = Callable[[str], SampledPath | TimedPath | SeamLine]  # name of the task -> its file, read
 
 
 class PathFields(TypedDict):
@@ -44,9 +44,10 @@ def path_fields(name: str, document: CellDocument, read_targets: TargetReader) -
     """Geometry of a path, how the tool is held to walls and weaves, and its projection or place."""
     task = document.tasks[name]
     entry = task.path
+    path = _path(name, entry, read_targets)
     return PathFields(
-        path=_path(name, entry, read_targets),
-        seam=_seam(entry),
+        path=path,
+        seam=_seam(entry, tuple(path.walls)) if isinstance(path, SeamLine) else _seam(entry, entry.wall_names),
         stretch=_stretch(entry),
         weave=None if entry.weave is None or is_woven_by_controller(task, document) else _weave(entry.weave, task),
         project=None if entry.project is None else direction(entry.project),
@@ -105,19 +106,20 @@ def _polyline(entry: PolylineEntry) -> PathSpec:
     return PolygonPath(plane=PlaneName(entry.plane), corners=tuple((u, v) for u, v in points), is_closed=entry.closed)
 
 
-def _seam(entry: PathEntry) -> Seam | None:
-    """How the tool is held to walls; None for a path without."""
-    if not entry.is_seam:
+def _seam(entry: PathEntry, names: tuple[str, ...]) -> Seam | None:
+    """How the tool is held to walls, by their names; None for a path without. Edges have walls of their file."""
+    if not entry.is_seam and not entry.is_edge:
         return None
     walls = {
         name: WallPlace(wall) if wall in tuple(WallPlace) else direction(wall)
-        for name, wall in (entry.walls or dict.fromkeys(entry.wall_names, SURFACE)).items()
+        for name, wall in ({} if entry.is_edge else entry.walls or dict.fromkeys(names, SURFACE)).items()
     }
+    work = entry.work_deg or (None if entry.is_edge and entry.from_ is None else Deg(0.0))
     return Seam(
         walls=walls,
         angles=SeamAngles(
-            face=entry.from_ or entry.wall_names[0],
-            work=(entry.work_deg or Deg(0.0)).si,
+            face=entry.from_ or names[0],
+            work=si_or_none(work),
             travel=(entry.push_deg or Deg(0.0)).si - (entry.drag_deg or Deg(0.0)).si,
             standoff=(entry.standoff_mm or Mm(0.0)).si,
             side=(entry.side_mm or Mm(0.0)).si,

@@ -9,13 +9,14 @@ from cellplan.files.schema.partial import ValidEntries
 from cellplan.files.schema.path import CsvEntry
 from cellplan.files.schema.task import TaskEntry
 from cellplan.files.yaml.reader import YamlDocument
+from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.model.task.task import SampledPath, TimedPath
 
 TIME_TOL: Final = 1e-9  # [-] of the duration: rounding of start_s + duration_s
 ORIENTATION_AXES: Final = frozenset({"rx", "ry", "rz"})
 MEANS_ELSE: Final = {"part": "the workpiece", "world": "the frame that everything stands in"}
 AT_REST: Final = frozenset({"part_at_rest", "semi_coordinated"})  # modes in which tasks are done on a part at rest
-Targets = Mapping[str, SampledPath | TimedPath]  # what was read of the files of paths, by task
+Targets = Mapping[str, SampledPath | TimedPath | SeamLine]  # what was read of the files of paths, by task
 CLOCK_KEYS: Final = ("duration_s", "feed_mm_s", "process", "time_law", "corners")  # what a trajectory decides by itself
 
 OF_LENGTH: Final = (
@@ -137,7 +138,8 @@ def _times(valid: ValidEntries, document: YamlDocument, name: str) -> Iterator[F
 def needs_surface(task: TaskEntry) -> bool:
     """Whether the tool's axis can come from nothing but the part's surface or the file of the path."""
     turns = ORIENTATION_AXES & set(task.axes)
-    return task.tool_axis == "normal" or (task.tool_axis is None and bool(turns) and not task.path.is_seam)
+    has_walls = task.path.is_seam or task.path.is_edge
+    return task.tool_axis == "normal" or (task.tool_axis is None and bool(turns) and not has_walls)
 
 
 def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Finding]:
@@ -168,7 +170,8 @@ def target_findings(valid: ValidEntries, targets: Targets, document: YamlDocumen
     """Everything in the tasks that contradicts the files of their paths."""
     for name, path in targets.items():
         task = valid.tasks[name]
-        yield from _axes(task, path, document, name)
+        if not isinstance(path, SeamLine):
+            yield from _axes(task, path, document, name)
         if isinstance(path, TimedPath):
             yield from _clock(task, document, name)
             yield from _end(task, path, valid, document=document, name=name)
