@@ -118,13 +118,17 @@ def weld_face(line: SeamLine, angles: SeamAngles) -> tuple[Array, Array]:
     """Directions of passes at each point of a seam: out between the walls, and across the weld face.
 
     Across is towards the wall that the angles name; beside one wall, or two that face alike, it is to the left of
-    travel, seen from outside.
+    travel, seen from outside. Between two walls that face each other, out is the normal of the wall that the work angle
+    is measured from.
 
     Returns:
         Unit vectors, shape (N, 3) each, expressed in P.
     """
     t, names = line.tangents, [*line.walls]
-    out = _across(sum((_across(line.walls[name], t) for name in names), np.zeros_like(t)), t)
+    normals = [_across(line.walls[name], t) for name in names]
+    middle = np.sum(normals, axis=0)
+    is_open = np.linalg.norm(middle, axis=1, keepdims=True) > FACE_ALIKE
+    out = _across(np.where(is_open, middle, normals[names.index(angles.face)]), t)
     left = cross(t, out) if angles.is_mirrored else cross(out, t)
     toward = angles.toward or next((name for name in names if name != angles.face), None)
     if toward is None:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.geometry.arrays import Array
-from cellplan.geometry.curves.seam_line import SeamAngles, SeamLine, cross_section, tool_axes, tool_targets
+from cellplan.geometry.curves.seam_line import SeamAngles, SeamLine, cross_section, tool_axes, tool_targets, weld_face
 from cellplan.geometry.transforms import rotation_exp
 
 EX, EY, EZ = np.eye(3)
@@ -73,6 +73,15 @@ def test_tip_stands_off_against_its_own_axis() -> None:
     points, axes = tool_targets(FILLET, SeamAngles(face="floor", work=0.4, travel=0.3, standoff=0.012))
 
     assert np.allclose(points + 0.012 * axes, FILLET.points, atol=1e-17)
+
+
+def test_passes_lie_across_the_weld_face() -> None:
+    out, across = weld_face(FILLET, SeamAngles(face="floor"))
+    groove = weld_face(along_x(left=-EY, right=EY), SeamAngles(face="left"))
+
+    assert np.allclose(out, ROOT * (EZ - EY), atol=1e-15)
+    assert np.allclose(across, ROOT * (EY + EZ), atol=1e-15)  # up the web, towards it
+    assert np.allclose(groove, [[-EY] * 2, [EZ] * 2], atol=1e-15)
 
 
 def test_walls_that_lean_along_the_seam_count_across_it_only() -> None:
