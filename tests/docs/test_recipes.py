@@ -278,9 +278,8 @@ def add_check(copy: Path) -> None:
 
 def add_format(copy: Path) -> None:
     (copy / "programs" / "formats" / "semicolons.py").write_text(FORMAT, encoding="utf-8")
-    dialects = copy / "programs" / "dialects.py"
-    insert(dialects, "from typing import Final\n", "\nfrom cellplan.programs.formats.semicolons import SEMICOLONS\n")
-    insert(dialects, "dialect.name: dialect for dialect in (", "SEMICOLONS, ")
+    line = '    semicolons="semicolons:SEMICOLONS",\n'
+    insert(copy / "programs" / "dialects.py", '    ros2="ros2.writer:ROS2",\n', line)
 
 
 def add_figure(copy: Path) -> None:

@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PAPERS = ROOT / "cells" / "papers"
 RECORD = ROOT / "docs" / "reproduction" / "measured.json"
 SEARCHED_TO = 1e-7  # [m] errors that the searches let pass
+TARGET_REACHED_PX = 1e-6  # errors in an image below a millionth of a pixel are none
 FAILS_AS_PUBLISHED = {"ribeiro_mode_3", "ribeiro_first_layout"}
 
 
@@ -49,6 +50,9 @@ def assert_same_figures(measured: object, recorded: object) -> None:
         for name, value in recorded.items():
             if name == "error_at_s" and recorded.get("error_m", math.inf) <= SEARCHED_TO:
                 continue  # chance says where an error is largest that is small enough everywhere
+            if name == "error_px" and value <= TARGET_REACHED_PX:
+                assert measured[name] <= TARGET_REACHED_PX
+                continue  # what is left of an error that decays differs with the kernels of the linear algebra
             assert_same_figures(measured[name], value)
     elif isinstance(recorded, list):
         assert isinstance(measured, list)

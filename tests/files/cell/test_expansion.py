@@ -169,3 +169,11 @@ def test_file_with_other_values_has_the_parts_in_their_order(tmp_path: Path, loa
 
     assert [task.name for task in load_cell("c").tasks] == list(root["tasks"])
     assert [task.after for task in load_cell("c").tasks][1] == (next(iter(root["tasks"])),)
+
+
+def test_tacks_that_are_not_made_are_named_once(refuse: Refuse) -> None:
+    tacks = "    tacks: {length_mm: 10, pitch_mm: 0}"
+
+    assert [line.split(": expected")[0] for line in refuse(seam(tacks, "{tacks_first: true}"))] == [
+        "c:21: tasks.root.tacks.pitch_mm"
+    ]

@@ -31,9 +31,10 @@ def task_rule_findings(
             if name in seen:
                 yield document.finding(path, f"expected each task once, got '{name}' twice")
             seen.add(name)
-    if program.tacks_first and not any(task.tack for task in valid.tasks.values()):
+    is_whole = len(valid.tasks) == len(known)
+    if program.tacks_first and is_whole and not any(task.tack for task in valid.tasks.values()):
         yield document.finding(("program", "tacks_first"), "expected tasks with tack: true, got none")
-    if not unknown and len(valid.tasks) == len(known):
+    if not unknown and is_whole:
         able = {name: tuple(robots.get(name, (task.robot,))) for name, task in valid.tasks.items()}
         yield from _robots(program, able, document)
         yield from _begins(valid, program, document)
