@@ -49,6 +49,7 @@ def pose_accuracy(scheduled: TaskSchedule, X_PT: Array) -> TaskAccuracy:
         start_s=task.start,
         end_s=scheduled.end,
         judged_from=task.judged_from,
+        lean=lean_of(X_PT, scheduled.X_PT) if task.tilt else None,
         process_off=tuple((off, on) for (_, off), (on, _) in pairwise(scheduled.process_on)),
     )
 
@@ -59,11 +60,12 @@ def errors_on_part(X_PT: Array, desired: Array, relation: Relation) -> Array:
     Args:
         X_PT: Tool poses, shape (N, 4, 4).
         desired: Reference ones, shape (N, 4, 4) or (1, 4, 4).
-        relation: The task or grasp; components that it leaves open are zero.
+        relation: The task or grasp; components that it leaves open are zero, and of a tool whose axis may lean the
+            rotation is that from the cone on.
     """
     position = desired[:, :3, 3] - X_PT[:, :3, 3]
     if relation.is_spin_free:
-        orientation = _turn_between(X_PT[:, None, :3, 2], desired[:, None, :3, 2])
+        orientation = _beyond(_turn_between(X_PT[:, None, :3, 2], desired[:, None, :3, 2]), relation.tilt)
     else:
         orientation = _turn_between(np.swapaxes(X_PT[:, :3, :3], 1, 2), np.swapaxes(desired[:, :3, :3], 1, 2))
     error = np.concatenate([position, orientation], axis=1)
@@ -71,10 +73,24 @@ def errors_on_part(X_PT: Array, desired: Array, relation: Relation) -> Array:
     return error
 
 
+def lean_of(X_PT: Array, desired: Array) -> float:
+    """Largest angle in [rad] between tool axes and desired ones, from poses of shape (N, 4, 4)."""
+    turns = _turn_between(X_PT[:, None, :3, 2], desired[:, None, :3, 2])
+    return float(np.linalg.norm(turns, axis=1).max())
+
+
 def error_lengths(X_PT: Array, desired: Array, relation: Relation) -> Array:
     """Lengths of these position errors in [m] and rotation vectors in [rad], shape (N, 2)."""
     error = errors_on_part(X_PT, desired, relation)
     return np.stack([np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)], axis=1)
+
+
+def _beyond(turn: Array, tilt: float) -> Array:
+    """Rotation vectors, shape (N, 3), without as much of each as lies within an angle in [rad]."""
+    if tilt == 0.0:
+        return turn
+    angle = np.linalg.norm(turn, axis=1, keepdims=True)
+    return turn * np.maximum(0.0, 1.0 - tilt / np.maximum(angle, tilt))
 
 
 def _turn_between(axes: Array, desired: Array) -> Array:

@@ -26,6 +26,7 @@ class MethodTraits:
     has_null_space: bool = True  # whether goals besides the tasks can be pursued in the null space of the task Jacobian
     # whether the pose error is fed back with the gain of the solver; searches minimise it directly
     feeds_back: bool = True
+    lets_axes_lean: bool = False  # whether a tool's axis that may lean moves within its cone; others keep the axis
     takes_euler_steps: bool = False  # whether a joint step is a joint velocity times the time step
     # why the motion can only be stepped along the clock, as a predicate of the method; empty where it can also be
     # resolved by collocation (the integrator ``accurate``)
@@ -59,6 +60,7 @@ METHODS: Final[Mapping[MethodName, MethodTraits]] = MappingProxyType(
         ),
         "quadratic_program": MethodTraits(
             label="quadratic program",
+            lets_axes_lean=True,
             takes_euler_steps=True,
             steps_because="gives up part of a task at a limit, and limits accelerations from step to step",
         ),

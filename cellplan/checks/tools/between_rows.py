@@ -8,7 +8,8 @@ so does the desired point within its own sag. The error is then nowhere larger t
 
 with the errors at both rows and in the middle, and the distance :math:`\sigma` of the desired point in the middle from
 the middle of both ends: a smooth path sags by a quarter of it in half a step, of which twice as much is taken.
-Rotations likewise: as chords of unit vectors, with the square of the sum of all turns in place of M. Where this bound
+Rotations likewise: as chords of unit vectors, with the square of the sum of all turns in place of M; where a tool's
+axis may lean, as chords of its whole angle, of which what lies beyond the cone is the error. Where this bound
 is wider than what is allowed, and where the motion of a tool is not smooth, the step is subdivided into ten parts.
 """
 
@@ -180,8 +181,9 @@ class ErrorsBetweenRows:
         nearby = np.maximum(np.maximum(tool.at_rows[:-1], tool.at_rows[1:]), middle)
         bound = np.empty_like(nearby)
         bound[:, 0] = nearby[:, 0] + chain.bend(self._moved) / 32.0 + 0.5 * sag[:, 0]
-        chord = 2.0 * np.sin(0.5 * nearby[:, 1]) + chain.turn_bend(self._moved) / 32.0 + 0.5 * sag[:, 1]
-        bound[:, 1] = 2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord))
+        angles = nearby[:, 1] + relation.tilt
+        chord = 2.0 * np.sin(0.5 * angles) + chain.turn_bend(self._moved) / 32.0 + 0.5 * sag[:, 1]
+        bound[:, 1] = np.maximum(2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord)) - relation.tilt, nearby[:, 1])
         constrained = sum(axis in relation.axes for axis in ROTATIONS)
         if not constrained:
             bound[:, 1] = 0.0

@@ -22,7 +22,8 @@ def check_accuracy(schedule: Schedule, accuracy: TaskAccuracy, task: Task) -> tu
     limits = {"position_error": allowed.position_mm, "orientation_error": allowed.orientation_deg}
     first, of = task.first_judged(schedule.times), f"of task '{task.name}'"
     checks = _worst_errors(schedule.times, accuracy, limits, first=first, subject=task.name, of=of)
-    return tuple(replace(check, message=f"{check.message}{since}") for check in checks)
+    cone = {"orientation_error": f" beyond a tilt of {DEG * task.tilt:.6g} deg"} if task.tilt else {}
+    return tuple(replace(check, message=f"{check.message}{cone.get(check.name, '')}{since}") for check in checks)
 
 
 def check_closure(cell: Cell, times: Array, closures: Sequence[ClosureAccuracy]) -> list[Check]:

@@ -28,6 +28,7 @@ from cellplan.model.settings.task import (
     FARTHEST_STAND_OFF_MM,
     LONGEST_S,
     MOST_CYCLES,
+    Free,
     ProcessEntry,
     ToleranceEntry,
     TorchEntry,
@@ -198,7 +199,11 @@ class TaskEntry(Entry):
         "Components of the motion that are prescribed, in the part frame.",
         min_length=1,
     )
-    free: tuple[Literal["spin"], ...] = setting((), "[spin] leaves the rotation about the tool's z axis open.")
+    free: Free = setting(
+        (),
+        "[spin] leaves the rotation about the tool's z axis open; with [spin, {tilt_deg: 10}] that axis may lean as "
+        "well, within a cone about the desired one. The method quadratic_program uses it, others keep the axis.",
+    )
     tolerance: ToleranceEntry = setting(ToleranceEntry(), "Largest allowed tool error.")
     start_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] | None = setting(
         None, "Start of the path on the common clock; when absent 0, or the end of the approach."
@@ -294,7 +299,7 @@ class TaskEntry(Entry):
             raise rule("expected either holder_deg or holder, got both", "holder")
         for name, words in (
             ("axes", self.axes),
-            ("free", self.free),
+            ("free", tuple("spin" if word == "spin" else "tilt_deg" for word in self.free)),
             ("off_part", self.off_part),
             ("after", self.preceding),
         ):

@@ -135,6 +135,11 @@ class Grasp:
         return False
 
     @property
+    def tilt(self) -> float:
+        """A grasp leaves the tool's axis no angle."""
+        return 0.0
+
+    @property
     def relative_to(self) -> Frame:
         """The tool is tied to the part."""
         return Frame.PART

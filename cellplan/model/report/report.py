@@ -100,6 +100,9 @@ class TaskAccuracy:
     # largest distance in [m] of a smooth path from the straight lines between its points, else None
     path_bulge: float | None = None
     judged_from: float = 0.0  # time in [s] from which its errors are judged: 0 unless the tool needs time to settle
+    lean: float | None = (
+        None  # largest angle in [rad] of a tool's axis from the desired one, where it may lean; or None
+    )
     process_off: Spans = ()  # stretches of time in [s] along its path, from rapid to rapid, in which its process is off
 
 

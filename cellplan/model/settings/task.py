@@ -1,14 +1,16 @@
 """Tolerance and process of a task, as a cell file states them, and bounds that tasks and programs share."""
 
-from typing import Annotated, Final, Self
+from typing import Annotated, Final, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, Tag, model_validator
 
-from cellplan.model.settings.entry import Entry, SlidingSpeed, rule, setting
+from cellplan.model.settings.entry import Entry, SlidingSpeed, by_kind, rule, setting
 from cellplan.model.settings.units import Deg, Mm, Within
 
 FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
 LONGEST_S: Final = 1e6  # [s] eleven days: longer is a wrong unit
+FREE_WORDS: Final = "spin or {tilt_deg: 10}"
+WIDEST_TILT_DEG: Final = 60.0  # beyond it a tool works with its side
 MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
 
@@ -38,6 +40,33 @@ class ToleranceEntry(Entry):
     def between(self) -> tuple[float, float]:
         """Largest position error in [m] and orientation error in [rad] between the rows."""
         return (self.between_rows_mm or self.position_mm).si, (self.between_rows_deg or self.orientation_deg).si
+
+
+class TiltEntry(Entry):
+    """How far the axis of a tool may lean."""
+
+    tilt_deg: Annotated[Deg, Within(gt=0.0, le=WIDEST_TILT_DEG)] = Field(
+        description="Largest angle between the tool's axis and the desired one, to any side."
+    )
+
+
+def _has_round_cone(free: "tuple[str | TiltEntry, ...]") -> "tuple[str | TiltEntry, ...]":
+    """A tool whose axis may lean may turn about it."""
+    if free and "spin" not in free:
+        raise rule("expected spin beside tilt_deg: [spin, {tilt_deg: 10}], as a cone is round")
+    return free
+
+
+FreeChoice = Annotated[
+    Annotated[Literal["spin"], Tag(f"<{FREE_WORDS}>")] | Annotated[TiltEntry, Tag("<mapping>")],
+    by_kind(FREE_WORDS, mapping=dict),
+]
+Free = Annotated[tuple[FreeChoice, ...], AfterValidator(_has_round_cone)]
+
+
+def tilt_of(free: Free) -> float:
+    """Largest angle in [rad] by which the axis of a tool may lean; 0 where it may not."""
+    return max((word.tilt_deg.si for word in free if isinstance(word, TiltEntry)), default=0.0)
 
 
 class TorchEntry(Entry):

@@ -207,6 +207,8 @@ class Task:
             further cycle turns it on.
         axes: Constrained components of the tool's motion in P, in the order x, y, z, rx, ry, rz.
         is_spin_free: Whether rotation about the tool's own axis is left open.
+        tilt: Half angle in [rad] of the cone about the desired axis within which the tool's axis may lean, with free
+            spin; 0 where it may not.
         tolerance: Largest allowed error.
         start: Start of the path on the common clock in [s]; an approach ends then, and a process is switched on.
         duration: Time for the whole path in [s], all cycles together; None when the feed, a trajectory or the common
@@ -255,6 +257,7 @@ class Task:
     turn: float = 0.0
     axes: tuple[int, ...]
     is_spin_free: bool = False
+    tilt: float = 0.0
     tolerance: ToleranceEntry
     start: float = 0.0
     duration: float | None

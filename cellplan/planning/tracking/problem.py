@@ -16,7 +16,7 @@ from cellplan.planning.tracking.given_path import GivenRows
 from cellplan.planning.tracking.joint_weights import JointWeights
 from cellplan.planning.tracking.motion_task import MotionTask, locked_since
 from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, rests_of, share_within
-from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
+from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows, tilt_rows
 from cellplan.scene.kinematics.pinocchio_model import CellState, CombinedModel
 
 Drift = Callable[[int, Array], Array]
@@ -69,6 +69,7 @@ class TrackingProblem:
         desired: Reference tool poses X_PT, shape (N, tasks, 4, 4); those of a feedback where there is one.
         twists: Reference tool twists in P, linear first, shape (N, tasks, 6).
         signs: +1 where a joint moves a task's tool, -1 where it moves the part, 0 elsewhere, shape (tasks, nq).
+        tilt_rows: Rows of tool axes that may lean, among those of all tasks.
         gain: Error feedback gain in [1/s].
         damping: Largest damping factor; None leaves it to the method.
         given: Joints whose motion the cell gives, at the samples.
@@ -90,6 +91,7 @@ class TrackingProblem:
         self._rows = [constraint_rows(task, X_RT) for task, X_RT in zip(tasks, desired.swapaxes(0, 1), strict=True)]
         self.constraints = TaskConstraints.of(cell, tasks, motion.moving)
         self.desired = desired if references is None else references
+        self.tilt_rows = tilt_rows(tasks)
         self._is_on_part = bool(self.constraints.is_on_part.all())
         self._lost = np.array([max(LOST_DISTANCE, 2.0 * _tolerance(cell, task)) for task in tasks])
         self._settled = np.array([_settled_from(task) for task in tasks])

@@ -6,12 +6,20 @@ one configuration) and the batched one (`collocation.batch_tasks`, many configur
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.cell.cell import Cell, Relation
 from cellplan.model.task.task import Frame
+
+
+class TiltRows(NamedTuple):
+    """Rows of a tool axis that may lean."""
+
+    rows: slice  # both of them among the rows of all tasks
+    tilt: float  # half angle of its cone in [rad]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -88,6 +96,17 @@ class TaskConstraints:
     def reference_frames(self, X_WP: Array) -> Array:
         """Frame R of each task for a pose of the part, shape (tasks, 4, 4)."""
         return np.where(self.is_on_part[:, None, None], X_WP, np.eye(4))
+
+
+def tilt_rows(tasks: Sequence[Relation]) -> tuple[TiltRows, ...]:
+    """Rows about x and y of the desired tool frame, among those of all tasks, of each tool whose axis may lean."""
+    rows, first = [], 0
+    for task in tasks:
+        count = int(constrained_components(task).sum())
+        if task.tilt:
+            rows.append(TiltRows(slice(first + count - 2, first + count), task.tilt))
+        first += count
+    return tuple(rows)
 
 
 def constrained_components(task: Relation) -> Flags:

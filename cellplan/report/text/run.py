@@ -43,6 +43,7 @@ def figure_lines(record: Record, more: str) -> list[str]:
         *_program_lines(record),
         *aligned(_rows(record)),
         *_integration_lines(record["solver"]),
+        *_tilt_lines(record),
         *(f"  {line}" for line in moved_start_lines(record["solver"].get("moved_starts") or [])),
         *(f"  note: {line}" for line in record.get("remarks", [])),
         *(f"  note: {line}" for _, line in open_surface_notes(record.get("open_surfaces", []))),
@@ -208,6 +209,15 @@ def _integration_lines(solver: Record) -> Iterator[str]:
         reason = f"; {lost['message']}" if lost else ""
         goals = "; smaller gains of the secondary goals may help" if solver.get("secondary") else ""
         yield f"  collocation failed at {resolution['euler_from_s']:.3f} s; continued with Euler steps{reason}{goals}"
+
+
+def _tilt_lines(record: Record) -> Iterator[str]:
+    """Which tools keep an axis that may lean, as the method does not let them."""
+    method = record["solver"]["method"]
+    names = [name for name, task in record["tasks"].items() if "allowed_tilt_deg" in task]
+    if names and not METHODS[method].lets_axes_lean:
+        users = ", ".join(name for name, traits in METHODS.items() if traits.lets_axes_lean)
+        yield f"  note: {method} keeps tool axes that may lean (tilt_deg of {', '.join(names)}); {users} lets them lean"
 
 
 def _place_lines(folder: Path) -> Iterator[str]:

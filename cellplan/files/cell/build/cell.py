@@ -28,7 +28,7 @@ from cellplan.model.cell.cell import Grasp, Mode, MotionSettings, Obstacle, Part
 from cellplan.model.cell.rod import Holder, Rod, tool_body_name
 from cellplan.model.origin import Origin
 from cellplan.model.robot.robot import BASE, Body, JointSum, RobotModel, configuration_in_si
-from cellplan.model.settings.task import ProcessEntry
+from cellplan.model.settings.task import ProcessEntry, tilt_of
 from cellplan.model.settings.units import Mm, MmPerS, in_si, si_or_none
 from cellplan.model.task.task import (
     Frame,
@@ -157,6 +157,7 @@ def build_task(
         turn=entry.tool_turn_deg.si,
         axes=_axis_numbers(entry.axes),
         is_spin_free="spin" in entry.free,
+        tilt=tilt_of(entry.free),
         tolerance=entry.tolerance.filled,
         start=entry.begins_s,
         duration=entry.duration_s,

@@ -249,6 +249,6 @@ def _follows(name: str, model: RobotModel, valid: ValidEntries) -> bool:
     held = valid.part.held_by if valid.part is not None else ()
     if any(grasp.robot == name for grasp in held[:1]):
         return False
-    counts = [len(task.axes) - len(task.free) for task in valid.tasks.values() if task.robot == name]
+    counts = [len(task.axes) - bool(task.free) for task in valid.tasks.values() if task.robot == name]
     counts += [len(grasp.axes) for grasp in held if grasp.robot == name]
     return not counts or len(model.joints) <= min(counts)

@@ -11,7 +11,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.report.report import Report, Standoff, TaskAccuracy, ToolDepth
 from cellplan.model.task.path_direction import run_direction
 from cellplan.model.task.task import Task
-from cellplan.model.units import MM
+from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import AXES, Number, Record, entry_record, number
 from cellplan.report.record.sections.tool_errors import BetweenRowsRecord, between_record, by_axis, largest, mean_length
 
@@ -92,7 +92,16 @@ class RapidsRecord(TypedDict, total=False):
     process_off_s: Annotated[list[list[Number]], "begin and end of each rapid move along the path: the process is off"]
 
 
-class TaskRecord(BetweenRowsRecord, DepthRecord, StandoffRecord, DirectionRecord, RapidsRecord, PhaseOfTask):
+class TiltRecord(TypedDict, total=False):
+    """Only of a tool whose axis may lean; its orientation errors count from the cone on."""
+
+    max_tilt_deg: Annotated[Number, "largest angle of the tool's axis from the desired one in the rows"]
+    allowed_tilt_deg: Annotated[Number, "half angle of the cone within which it may lean"]
+
+
+class TaskRecord(
+    BetweenRowsRecord, DepthRecord, StandoffRecord, DirectionRecord, RapidsRecord, TiltRecord, PhaseOfTask
+):
     """Tool error of a task, desired minus actual, over the components that the task constrains."""
 
     robot: Annotated[str, "the operator"]
@@ -167,6 +176,7 @@ def _task_record(
         "start_s": number(accuracy.start_s),
         "end_s": number(accuracy.end_s),
         **_rapids_record(accuracy),
+        **_tilt_record(accuracy, task),
         **_phase_of(report),
         **direction_record(task),
         **between_record(accuracy.between),
@@ -180,6 +190,13 @@ def _rapids_record(accuracy: TaskAccuracy) -> RapidsRecord:
     """When the process of a task is off along its path; nothing where it is on throughout."""
     off = [[number(begin), number(end)] for begin, end in accuracy.process_off]
     return {"process_off_s": off} if off else {}
+
+
+def _tilt_record(accuracy: TaskAccuracy, task: Task) -> TiltRecord:
+    """How far the axis of a tool leans, where it may."""
+    if accuracy.lean is None:
+        return {}
+    return {"max_tilt_deg": number(accuracy.lean, DEG), "allowed_tilt_deg": number(task.tilt, DEG)}
 
 
 def _phase_of(report: Report) -> PhaseOfTask:
