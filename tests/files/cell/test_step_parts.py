@@ -5,8 +5,10 @@ from pathlib import Path
 import pytest
 from builders.step_files import Named, box, cylinder, write_step
 
+from cellplan.checks.clearance.tool_depth import check_depths
 from cellplan.errors import InputError
 from cellplan.files.cell.load import load_cell
+from cellplan.model.report.report import ToolDepth
 from cellplan.report.record.sections.rests_on import bodies_record
 from cellplan.scene.bodies import Kind, scene_bodies
 from cellplan.scene.pairs import sort_pairs
@@ -77,6 +79,20 @@ def test_the_deviation_is_added_to_the_demanded_clearance_where_accuracies_are(c
     assert demands["report"] == pytest.approx(5e-3, abs=1e-12)
     assert demands["add"] == pytest.approx(5.2e-3, abs=1e-12)  # the tool is exact
     assert bodies_record(cell)["part"]["accuracy_mm"] == pytest.approx(0.2)
+
+
+def test_the_deviation_is_added_to_the_depth_of_a_tool_where_accuracies_are(cell_file: Path) -> None:
+    depths = [
+        ToolDepth(task="line", robot="arm", depth=depth, at_s=None, limit=1e-3, body="axis")
+        for depth in (0.0, 0.7e-3, 0.9e-3)
+    ]
+    verdicts = {}
+    for word in ("report", "add"):
+        cell = load_cell(cell_file).with_values({"checks.body_accuracy": word})
+        verdicts[word] = [(check.passed, check.value) for check in check_depths(cell, depths)]
+
+    assert verdicts["report"] == [(True, 0.0), (True, pytest.approx(0.7)), (True, pytest.approx(0.9))]
+    assert verdicts["add"] == [(True, 0.0), (True, pytest.approx(0.9)), (False, pytest.approx(1.1))]
 
 
 @pytest.mark.parametrize(
