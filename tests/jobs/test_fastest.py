@@ -19,7 +19,7 @@ from cellplan import Cell, load_cell, solve
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.files.run.joint_tables import table_body
 from cellplan.jobs.fastest.demand import calmest, read_demand, refuse_unless_possible
-from cellplan.jobs.fastest.result import fastest_record, write_fastest
+from cellplan.jobs.fastest.result import curve_figures, fastest_record, write_fastest
 from cellplan.jobs.fastest.shortest import ShortestCycles, fastest
 from cellplan.jobs.fastest.timed_program import Law, TimedProgram, scaled_values
 from cellplan.report.record.figures import LOAD, energy_proxy
@@ -327,6 +327,19 @@ def test_everything_that_takes_time_is_scaled(cell: Cell) -> None:
         "tasks.first.start_s": 0.375,
         "tasks.first.feed_mm_s": pytest.approx(400.0),
     }
+
+
+@pytest.mark.slow
+def test_a_cycle_that_feeds_alone_decide_has_no_calmer_one_and_no_plot(cell: Cell, tmp_path: Path) -> None:
+    welding = cell.with_values({"motion.duration_s": None, "tasks.first.process": {"feed_mm_s": 150}})
+    cycles = fastest(welding, points=2)
+    record = fastest_record(cycles)
+
+    assert [point["law"] for point in record["curve"] if point["figures"]] == ["time_laws", "common_speed"]
+    alike = {**record, "curve": record["curve"][:1]}
+    assert curve_figures(alike) == {}
+    write_fastest(cycles, tmp_path / "fastest")
+    assert (tmp_path / "fastest" / "fastest.html").exists()
 
 
 def test_times_that_do_not_follow_the_clock_are_refused(cell: Cell) -> None:

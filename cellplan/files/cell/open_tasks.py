@@ -63,12 +63,14 @@ def open_task_findings(document: YamlDocument) -> Iterator[Finding]:
 
 
 def unknown_robot_findings(document: YamlDocument) -> Iterator[Finding]:
-    """Refuse lists with names that are not those of robots."""
-    for name, robots in open_tasks(document.root).items():
-        known = list(document.root["robots"])
-        for index, robot in enumerate(robots):
-            if robot not in known:
-                words = f"expected one of {listed(known)}, got {shown(robot)}{did_you_mean(robot, known)}"
+    """Refuse lists with names that are not those of robots, and with a robot twice."""
+    for name in open_tasks(document.root):
+        known, robots = list(document.root["robots"]), document.root["tasks"][name]["robot"]
+        for index, robot in enumerate(map(str, robots) if isinstance(robots, tuple) else ()):
+            words = f"expected one of {listed(known)}, got {shown(robot)}{did_you_mean(robot, known)}"
+            if robot in robots[:index]:
+                words = f"expected each robot once, got {shown(robot)} twice"
+            if robot not in known or robot in robots[:index]:
                 yield document.finding(("tasks", name, "robot", index), words)
     if undone := [name for name, robots in open_tasks(document.root).items() if not robots]:
         words = f"expected an available robot that does not hold the part, got none{_more(undone[1:])}"

@@ -175,10 +175,12 @@ def production_curve(
     """The load at the shortest cycle of each law and at calmer ones, in equal ratios up to three times as long.
 
     Every point is a program that was planned anew, written and read back. Its clearance is not certified again: all
-    points of a law run along one joint path, and that of the shortest one is.
+    points of a law run along one joint path, and that of the shortest one is. Feeds of processes stay: where they
+    alone decide how long all takes, a law has one point.
     """
     factors = [LONGEST ** ((k + 1) / points) for k in range(points)]
-    sought = [(program.law, _values(base, program, factor)) for program, factor in product(shortest, factors)]
+    longer = [(program, _values(base, program, factor)) for program, factor in product(shortest, factors)]
+    sought = [(program.law, values) for program, values in longer if values != program.values]
     variants = [Variant(number, values) for number, (_, values) in enumerate(sought)]
     by_law: dict[Law, list[CurvePoint]] = {
         program.law: [CurvePoint(law=program.law, values=program.values, figures=program.figures.record(LOAD))]
@@ -186,9 +188,8 @@ def production_curve(
     }
     laws = tuple(law for law, _ in sought)
     with outcomes(variants, partial(_outcome, base, laws, task), workers) as every:
-        for (law, values), outcome in zip(sought, every, strict=True):
+        for done, ((law, values), outcome) in enumerate(zip(sought, every, strict=True), start=1):
             by_law[law].append(CurvePoint(law=law, values=values, figures=outcome.figures, reason=outcome.reason))
-            done = sum(map(len, by_law.values())) - len(shortest)
             progress(f"production curve: cycle {done} of {len(sought)}", done / len(sought))
     return tuple(point for group in by_law.values() for point in group)
 

@@ -71,6 +71,14 @@ def test_a_list_with_an_unknown_robot_is_refused(tmp_path: Path) -> None:
         load_open_cell(tmp_path / "cell.yaml")
 
 
+def test_a_list_with_a_robot_twice_is_refused(tmp_path: Path) -> None:
+    text = OPEN.read_text().replace("robot: any", "robot: [west, east, west]", 1)
+    (tmp_path / "cell.yaml").write_text(text)
+
+    with pytest.raises(InputError, match=r"tasks\.top_1\.robot\[2\]: expected each robot once, got 'west' twice"):
+        load_open_cell(tmp_path / "cell.yaml")
+
+
 def test_tasks_without_an_available_robot_are_refused_in_one_line(tmp_path: Path) -> None:
     text = OPEN.read_text().replace("home_deg:", "available: false\n    home_deg:")
     (tmp_path / "cell.yaml").write_text(text)

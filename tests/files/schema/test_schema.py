@@ -177,9 +177,16 @@ def test_the_json_schema_refuses_names_that_no_cell_may_have() -> None:
 def test_every_key_with_a_unitless_name_is_not_a_length_or_an_angle(model: Any) -> None:
     lengths = {"xyz", "rpy", "radius", "length", "size", "duration", "step", "feed", "clearance", "start_deg_s"}
 
-    properties = {name for node in walk(model.model_json_schema()) if isinstance(node, dict) for name in node}
+    entries = [node for node in walk(model.model_json_schema()) if isinstance(node, dict) and "properties" in node]
+    numbers = {
+        name
+        for entry in entries
+        for name, value in entry["properties"].items()
+        if any(isinstance(node, dict) and node.get("type") == "number" for node in walk(value))
+    }
 
-    assert not properties & lengths
+    assert {"xyz_mm", "rpy_deg", "clearance_mm", "length_mm"} & numbers
+    assert not numbers & lengths
 
 
 def test_defaults_of_the_schema_are_finite() -> None:
