@@ -31,7 +31,9 @@ def test_help_names_every_command_and_nothing_unfinished(capsys: pytest.CaptureF
     reported = capsys.readouterr().out
     assert status == 0
     commands = re.findall(r"^  (\w+) ", reported.partition("Begin:")[2], re.MULTILINE)
-    expected = "init robots check explain schema solve view floorplan verify export assign layout map fastest sweep"
+    expected = (
+        "init robots seams check explain schema solve view floorplan verify export assign layout map fastest sweep"
+    )
     assert commands == [*expected.split(), "compare", "rehearse", "recover"]
 
 

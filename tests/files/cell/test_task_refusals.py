@@ -181,7 +181,7 @@ Refuse = Callable[..., list[str]]
         (
             "tool_axis: normal",
             "free: [spinn]",
-            "c:20: tasks.ring.free[0]: expected spin, got 'spinn', did you mean 'spin'?",
+            "c:20: tasks.ring.free[0]: expected spin or {tilt_deg: 10}, got 'spinn', did you mean 'spin'?",
         ),
         (
             "tool_axis: normal",
