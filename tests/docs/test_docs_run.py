@@ -78,6 +78,7 @@ def assert_shown(expected: str, output: str) -> None:
 LONG = {  # their commands and functions have tests of their own, which are quicker
     "accurate-mode.md",
     "from-the-drawing.md",
+    "paths-from-cam.md",
     "manifest.md",
     "repair-a-cell.md",
     "compare.md",
