@@ -52,6 +52,7 @@ def test_tasks_at_once_begin_together_and_not_one_after_the_other(at_once: Solut
     assert not at_once.passed
 
 
+@pytest.mark.slow
 def test_tasks_in_turn_begin_apart_by_a_path_and_what_lies_between() -> None:
     solution = solved({"tasks.ring.after": "frame"}, together=("ring", "frame"))
     between = sum(run.report.cycle_time for run in solution.runs[1:3])

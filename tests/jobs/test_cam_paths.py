@@ -58,6 +58,7 @@ def test_the_rows_have_the_feed_of_each_cut_and_the_speed_of_rapids(folder: Path
     assert speeds[ends[1] + 1 : len(speeds) - 1].max() == pytest.approx(15.0, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_report_says_what_is_not_part_of_the_path_and_when_the_process_is_off(folder: Path) -> None:
     report = json.loads((folder / "run/report.json").read_text())
 

@@ -18,7 +18,11 @@ from cellplan.files.cell.load import load_cell
 from cellplan.files.cell.write import render_cell
 from cellplan.files.templates import TEMPLATES, Template, template_files, template_named, write_folder
 
-NAMED = [pytest.param(template, id=template.name) for template in TEMPLATES]
+LONG = {"step-frame"}  # eight seams of a drawing, which `tests/files/cell/test_edge_paths.py` reads too
+NAMED = [
+    pytest.param(template, id=template.name, marks=pytest.mark.slow if template.name in LONG else ())
+    for template in TEMPLATES
+]
 
 
 @pytest.fixture(scope="module", params=NAMED)

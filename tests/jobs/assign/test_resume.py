@@ -46,6 +46,7 @@ def interrupt_after(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
     monkeypatch.setattr(RecordedAnswers, "__call__", until)
 
 
+@pytest.mark.slow
 def test_a_bound_that_was_interrupted_ends_with_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     command = f"cellplan assign {OPEN} {FEW} --only-bound --quiet"
     assert run_command(f"{command} -o whole", tmp_path)[0] == 0

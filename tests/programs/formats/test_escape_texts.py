@@ -247,6 +247,7 @@ def _distance(p: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
     return float(np.linalg.norm(p - a - share * (b - a)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("form", "count", "seeds"), [("krl", 2, 8), ("krl", 3, 4), ("fanuc_ls", 2, 2), ("val3", 2, 2)])
 def test_robots_go_only_where_all_registers_have_even_or_all_odd_numbers(form: str, count: int, seeds: int) -> None:
     model = replace(arm_model(), controller=zero_of(6)) if form == "fanuc_ls" else arm_model()

@@ -82,6 +82,7 @@ def test_the_main_job_counts_steps_and_motions_and_is_read_with_these_numbers_on
                     dialect.read(job.frame, {**files, path: text[: match.start()] + changed + text[match.end() :]})
 
 
+@pytest.mark.slow
 def test_an_escape_is_read_back_and_every_change_is_noticed(escape: EscapeProgram) -> None:
     files, rng = INFORM_ESCAPE.render(escape), np.random.default_rng(4)
     read = read_escape(INFORM_ESCAPE, escape, files)

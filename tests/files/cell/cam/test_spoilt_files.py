@@ -144,6 +144,7 @@ def test_bytes_that_are_no_text_and_files_that_are_too_large_are_refused(tmp_pat
         read(file, settings())
 
 
+@pytest.mark.slow
 def test_a_flood_of_empty_lines_takes_no_memory_beyond_the_file(tmp_path: Path) -> None:
     file = written(tmp_path, APT_HEAD + TWO + "\n" * 300_000 + "CIRCLE/0,0,0,0,0,1,5\n")
     tracemalloc.start()

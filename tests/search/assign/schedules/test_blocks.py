@@ -197,6 +197,7 @@ def best_without_rules(seed: int) -> int | None:
     return best_by_enumeration(small_instance(seed, 4, chained=seed % 4 == 3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
 def test_with_rules_the_model_is_as_good_as_enumeration_and_some_rules_bind(rules: TaskRules) -> None:
     """An instance that no schedule keeps is found to be one by the model, by enumeration and without a solver."""
