@@ -1,11 +1,11 @@
 """Keys by which one task of a cell file stands for several, or for one with a longer path."""
 
-from typing import Annotated, Final
+from typing import Annotated, Final, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from cellplan.files.schema.seam import Dwell, Length, Shift, TravelAngle, WeaveEntry, WorkAngle
-from cellplan.model.settings.entry import Entry, SlidingSpeed, setting
+from cellplan.model.settings.entry import Entry, SlidingSpeed, rule, setting
 from cellplan.model.settings.task import LONGEST_S
 
 MOST_PARTS: Final = 100  # tasks that one may stand for
@@ -48,6 +48,15 @@ class TacksEntry(Entry):
     count: Count | None = setting(
         None, "Number of tacks; as many as the path as it is drawn holds when absent, required for a file."
     )
+
+    @model_validator(mode="after")
+    def _are_apart(self) -> Self:
+        """Tacks do not overlap."""
+        if self.pitch_mm <= self.length_mm:
+            raise rule(
+                f"expected more than the length of a tack, {self.length_mm:g}, got {self.pitch_mm:g}", "pitch_mm"
+            )
+        return self
 
 
 class CraterEntry(Entry):

@@ -146,6 +146,10 @@ def test_parts_of_an_open_task_are_open(load: Load, tmp_path: Path) -> None:
             "c:21: tasks.root.stitch: expected 1 to 100 of them on the path; of a path from a file, write their count",
         ),
         (
+            "    tacks: {length_mm: 80, pitch_mm: 56}",
+            "c:21: tasks.root.tacks.pitch_mm: expected more than the length of a tack, 80, got 56",
+        ),
+        (
             "    crater: {back_mm: 5, time_s: 0.8}\n    tack: 1",
             "c:22: tasks.root.tack: expected true or false, got 1",
         ),
