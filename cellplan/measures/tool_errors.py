@@ -6,8 +6,9 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.cell.cell import Cell, Relation, RobotRows
-from cellplan.model.motion.motion import TaskSchedule
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import ClosureAccuracy, TaskAccuracy
+from cellplan.model.task.clocked_path import on_line
 from cellplan.model.task.task import Frame
 from cellplan.scene.kinematics.screw_chain import Chains, ScrewChain
 
@@ -33,6 +34,13 @@ def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP:
 def relative_to_task_frame(relation: Relation, X_WT: Array, X_WP: Array) -> Array:
     """Tool poses relative to what a task or grasp is given in: the part, or the world, shape (N, 4, 4)."""
     return X_WT if relation.relative_to is Frame.WORLD else inverse(X_WP) @ X_WT
+
+
+def points_of_travel(schedule: Schedule, scheduled: TaskSchedule, X_WT: Array, X_WP: Array) -> Array:
+    """Tips in the frame of a task, without their weave: the points whose speed is the feed, in [m], shape (N, 3)."""
+    points: Array = relative_to_task_frame(scheduled.task, X_WT, X_WP)[:, :3, 3]
+    path = schedule.woven(scheduled.task)
+    return points if path is None else points - on_line(path, scheduled.travelled)[1]
 
 
 def pose_accuracy(scheduled: TaskSchedule, X_PT: Array) -> TaskAccuracy:

@@ -8,13 +8,13 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.measures.accelerations import jerks, point_accelerations
-from cellplan.measures.tool_errors import relative_to_task_frame
+from cellplan.measures.tool_errors import points_of_travel
 from cellplan.model.cell.cell import Cell, RobotRows, Timing
 from cellplan.model.cell.joint_limits import acceleration_limit, retimed_jerk_limit
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import Check
 from cellplan.model.settings.task import ProcessEntry
-from cellplan.model.task.clocked_path import ClockedPath, fixed_rests, on_line, process_spans
+from cellplan.model.task.clocked_path import ClockedPath, fixed_rests, process_spans
 from cellplan.model.task.task import TIME_TOLERANCE, Task
 from cellplan.model.units import MM
 from cellplan.scene.scene import Scene
@@ -48,10 +48,7 @@ def check_feeds(scene: Scene, schedule: Schedule, q: RobotRows, X_WP: Array) -> 
         task = scheduled.task
         if task.process is not None:
             X_WT = scene.chains[task.robot].tool_poses(q[task.robot])
-            points = relative_to_task_frame(task, X_WT, X_WP)[:, :3, 3]
-            path = schedule.woven(task)
-            if path is not None:
-                points = points - on_line(path, scheduled.travelled)[1]
+            points = points_of_travel(schedule, scheduled, X_WT, X_WP)
             speeds = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(schedule.times)
             yield _check(scene.cell, scheduled, _steps(schedule, scheduled, task.process, speeds), q)
     clock = schedule.clock

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from cellplan.geometry.arrays import Array, first_peak
-from cellplan.measures.tool_errors import relative_to_task_frame
+from cellplan.measures.tool_errors import points_of_travel
 from cellplan.model.cell.acceleration import STEADY_FRACTION, ProcessSpeed
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.motion.motion import Schedule, TaskSchedule
@@ -52,28 +52,28 @@ def check_tool_speeds(cell: Cell, speeds: Mapping[str, RobotSpeed]) -> list[Chec
 
 
 def process_speeds(schedule: Schedule, X_WT: Mapping[str, Array], X_WP: Array) -> dict[str, ProcessSpeed]:
-    """Speed of every tool that moves along its path, by task.
+    """Speed of every tool that moves along its path, by task; of one that weaves, that along its seam.
 
     Args:
         X_WT: Tool poses in the world, shape (N, 4, 4), by robot.
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """
     speeds = {
-        scheduled.task.name: _process_speed(scheduled, schedule.times, X_WT[scheduled.task.robot], X_WP=X_WP)
+        scheduled.task.name: _process_speed(schedule, scheduled, X_WT[scheduled.task.robot], X_WP)
         for scheduled in schedule.tasks
     }
     return {name: speed for name, speed in speeds.items() if speed is not None}
 
 
-def _process_speed(scheduled: TaskSchedule, times: Array, X_WT: Array, *, X_WP: Array) -> ProcessSpeed | None:
+def _process_speed(schedule: Schedule, scheduled: TaskSchedule, X_WT: Array, X_WP: Array) -> ProcessSpeed | None:
     """Speeds between the samples from the start of the path, once settled, to its end; None for a tool at rest."""
-    task = scheduled.task
+    task, times = scheduled.task, schedule.times
     tolerance = 1e-6 * float(times[-1])  # rounding of times
     begin = scheduled.begin + task.settle
     steps = np.flatnonzero((times[:-1] >= begin - tolerance) & (times[1:] <= scheduled.end + tolerance))
     if not len(steps) or not scheduled.length > 0.0:
         return None
-    points = relative_to_task_frame(task, X_WT, X_WP)[:, :3, 3]
+    points = points_of_travel(schedule, scheduled, X_WT, X_WP)
     speeds = (np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(times))[steps]
     lengths = np.diff(times)[steps]
     peak = float(speeds.max())

@@ -1,5 +1,6 @@
 """Programs of seams that weave: on the seam where the controller weaves, else along the weave at the feed of travel."""
 
+import json
 import re
 from pathlib import Path
 
@@ -92,3 +93,6 @@ def test_rows_weave_elsewhere_and_travel_at_the_feed(tmp_path: Path) -> None:
     assert len(moves) > 15
     assert travel == pytest.approx(30.0, abs=0.2)
     assert travel / seconds == pytest.approx(8.0, rel=0.03)  # the ramps at both ends, and speeds in tenths
+    report = json.loads((tmp_path / "run" / "work-1" / "report.json").read_text(encoding="utf-8"))
+    speed = report["tasks"]["seam"]["process_speed"]
+    assert speed["peak_mm_s"] == pytest.approx(8.0, rel=1e-3)  # of travel: the tip itself is faster
