@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cellplan.files.cell.cam.settings import CamSettings
+from cellplan.files.cell.paths.settings import CamSettings
 from cellplan.geometry.transforms import Array
 
 APT_HEAD = "PARTNO/DOME\nUNITS/MM\nMULTAX/ON\nFEDRAT/600,MMPM\n"

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
-from cellplan.files.cell.cam.apt import read_apt
-from cellplan.files.cell.cam.gcode import read_gcode
-from cellplan.files.cell.cam.settings import CamSettings
-from cellplan.files.cell.toolpath_csv import read_toolpath_csv
+from cellplan.files.cell.paths.apt import read_apt
+from cellplan.files.cell.paths.csv_table import read_toolpath_csv
+from cellplan.files.cell.paths.gcode import read_gcode
+from cellplan.files.cell.paths.settings import CamSettings
 from cellplan.files.input.files import AllowedFolders, digest_of_file
 from cellplan.files.input.findings import Finding, KeyPath, key_text, shown
 from cellplan.files.robots.build_controller import with_zero_of_file

@@ -7,7 +7,7 @@ import pytest
 from builders.roller_paths import EZ, ROLLER, task_on
 
 from cellplan.errors import InputError
-from cellplan.files.cell.toolpath_csv import read_toolpath_csv
+from cellplan.files.cell.paths.csv_table import read_toolpath_csv
 from cellplan.geometry.curves.curve import chord_lengths, smooth_through, straight_sides
 from cellplan.model.task.task import SampledPath, SpacePolylinePath, TimedPath
 from cellplan.planning.path.build import build_toolpath

@@ -7,9 +7,9 @@ import pytest
 from builders.cam_files import APT_HEAD, GCODE_HEAD, settings, written
 
 from cellplan.errors import InputError
-from cellplan.files.cell.cam.apt import read_apt
-from cellplan.files.cell.cam.gcode import read_gcode
-from cellplan.files.cell.cam.locations import MOST_BYTES
+from cellplan.files.cell.paths.apt import read_apt
+from cellplan.files.cell.paths.gcode import read_gcode
+from cellplan.files.cell.paths.locations import MOST_BYTES
 
 TWO = "GOTO/0,0,0\nGOTO/1,0,0\n"
 MOVES = "G0 X0 Y0 Z0\nG1 X1\n"

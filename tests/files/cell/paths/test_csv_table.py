@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cellplan.errors import InputError, InvalidFileError
-from cellplan.files.cell.toolpath_csv import read_toolpath_csv
+from cellplan.files.cell.paths.csv_table import read_toolpath_csv
 from cellplan.model.task.task import SampledPath, TimedPath
 
 HEADER = "x_mm,y_mm,z_mm\n"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders.cam_files import APT_HEAD, dome, dome_apt, settings, written
 
-from cellplan.files.cell.cam.apt import read_apt
+from cellplan.files.cell.paths.apt import read_apt
 from cellplan.geometry.transforms import pose
 from cellplan.model.task.task import ProgrammedPath
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.files.cell.toolpath_csv import MOST_POINTS
+from cellplan.files.cell.paths.csv_table import MOST_POINTS
 
 OFF_CIRCLE_MM: Final = 0.01  # difference of the distances of both ends from a centre written with three decimals
 SAME_MM: Final = 1e-6  # start and end nearer than this are one point

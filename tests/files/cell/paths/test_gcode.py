@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders.cam_files import GCODE_HEAD, settings, written
 
-from cellplan.files.cell.cam.gcode import read_gcode
+from cellplan.files.cell.paths.gcode import read_gcode
 from cellplan.model.task.task import ProgrammedPath
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.files.cell.cam.locations import MM_PER_INCH, UPRIGHT, Locations, Point, file_lines, number, wrong_number
-from cellplan.files.cell.cam.settings import CamSettings
+from cellplan.files.cell.paths.locations import MM_PER_INCH, UPRIGHT, Locations, Point, file_lines, number, wrong_number
+from cellplan.files.cell.paths.settings import CamSettings
 from cellplan.files.input.findings import did_you_mean, shown
 from cellplan.model.task.task import ProgrammedPath
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.files.cell.cam.arcs import Arc, arc_points
-from cellplan.files.cell.cam.locations import MM_PER_INCH, UPRIGHT, Locations, Point, file_lines
-from cellplan.files.cell.cam.settings import CamSettings
+from cellplan.files.cell.paths.arcs import Arc, arc_points
+from cellplan.files.cell.paths.locations import MM_PER_INCH, UPRIGHT, Locations, Point, file_lines
+from cellplan.files.cell.paths.settings import CamSettings
 from cellplan.files.input.findings import shown
 from cellplan.model.task.task import ProgrammedPath
 

@@ -11,8 +11,8 @@ from typing import Final, NoReturn
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.files.cell.cam.settings import CamSettings
-from cellplan.files.cell.toolpath_csv import FARTHEST, METRES_PER_MM, MOST_POINTS, SHORTEST_AXIS
+from cellplan.files.cell.paths.csv_table import FARTHEST, METRES_PER_MM, MOST_POINTS, SHORTEST_AXIS
+from cellplan.files.cell.paths.settings import CamSettings
 from cellplan.files.input.files import read_regular_file, utf8_text
 from cellplan.files.input.findings import listed, shown
 from cellplan.model.settings.entry import FASTEST_MM_S
