@@ -50,6 +50,11 @@ class WeaveEntry(Entry):
     )
     dwell_left_s: Dwell = setting(0.0, "Time for which the tool travels along the left edge in each period.")
     dwell_right_s: Dwell = setting(0.0, "Likewise along the right edge.")
+    dwell: Literal["moving", "standing"] = setting(
+        "moving",
+        "What the tool does meanwhile: it travels on along the edge, or stands, and travels as much faster between the "
+        "edges as its mean travel needs for the feed.",
+    )
     out_mm: Length | None = setting(
         None, "Distance of the edges of a triangle from the path, out of the part; required with triangle only."
     )
@@ -69,6 +74,8 @@ class WeaveEntry(Entry):
             )
         if self.form == "circle" and (self.dwell_left_s or self.dwell_right_s):
             raise rule("expected no dwells, a circle has no edges", "form")
+        if self.dwell == "standing" and not (self.dwell_left_s or self.dwell_right_s):
+            raise rule("expected dwell_left_s or dwell_right_s beside it, got neither", "dwell")
         return self
 
 

@@ -1,6 +1,7 @@
 """Rerun: stretches of a curve, one after the other, forwards or backwards, with the orientation along them."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -67,12 +68,19 @@ class RerunCurve:
         return p, sign * dp
 
 
+class OtherParameter(Protocol):
+    """A way from new parameters of a curve to its own."""
+
+    def at(self, v: Array, interval: Interval) -> tuple[Array, Interval, Array]:
+        """Old parameters of new ones, shape (N,), old intervals, and the rates of the old ones, shape (N, 1)."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RerunSeam:
     """A seam along stretches of its curve, with its own direction; see `SeamPlaces`."""
 
     seam: SeamPlaces
-    rerun: Rerun
+    rerun: OtherParameter
 
     def line(self, u: Array, interval: Interval) -> SeamLine:
         """The seam at new parameters."""

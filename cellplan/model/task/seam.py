@@ -61,3 +61,4 @@ class Weave:
     wavelength: float  # length of the seam for one whole period, dwells included
     dwells: tuple[float, float] = (0.0, 0.0)  # length for which it travels along the left and the right edge
     out: float = 0.0  # distance of the edges from the seam, out of the part: of a triangle
+    stands: bool = False  # whether it stands at the edges meanwhile, and travels faster between them

@@ -61,7 +61,9 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
     is_timed = isinstance(task.path, TimedPath)
     if not is_timed:
         _refuse_standstill(curve.curve, arc, task.where("path"))
-    tip = curve.curve if task.weave is None else woven_path(task, task.weave, curve, arc, orientation)
+    tip, seam = curve.curve, curve.seam
+    if task.weave is not None:
+        tip, orientation, seam = woven_path(task, task.weave, curve, arc, orientation)
     is_closed = curve.is_closed and _comes_back(tip, orientation, curve.stops)
     if task.repeat > 1 and not is_closed:
         raise InputError(
@@ -81,7 +83,7 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
         stand_off=task.approach.distance if task.approach else 0.0,
         is_timed=is_timed,
         bulge=curve.bulge,
-        seam=curve.seam,
+        seam=seam,
     )
     if not is_rigid(toolpath.spread(PROBES)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")

@@ -1,7 +1,8 @@
 """Weave: a tip that swings about its seam while it travels along it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -10,15 +11,16 @@ from cellplan.geometry.arrays import Array
 from cellplan.geometry.curves.arc_length import ArcLength
 from cellplan.geometry.curves.curve import BezierCurve, Curve, Interval, by_differences, cubic_fit
 from cellplan.geometry.curves.orientation import Orientation
+from cellplan.geometry.curves.rerun import RerunSeam
+from cellplan.geometry.curves.seam_line import SeamPlaces
 from cellplan.geometry.transforms import cross
 from cellplan.model.task.seam import Weave, WeaveForm
-from cellplan.model.task.task import Task, TimeLaw, TimeLawKind
+from cellplan.model.task.task import Task
 from cellplan.model.task.time_law import advance
 from cellplan.planning.path.curve import PathCurve
 from cellplan.planning.path.formatting import in_mm
+from cellplan.planning.path.standing import STROKE_LAW, TURN, StandingFrame, StandingTravel
 
-TURN: Final = 0.1  # [-] of a stroke from edge to edge, in which it comes to its speed or from it
-STROKE_LAW: Final = TimeLaw(kind=TimeLawKind.STEADY, ramp=TURN)
 DIRECTION_FIT: Final = 1e-7  # [-] of unit vectors across a seam: a weave of 10 mm is off by a nanometre
 SAME_KNOT: Final = 1e-9  # [-] of a wavelength: knots nearer to one another are one, but for rounding
 NO_JUMP: Final = 1e-7  # [m] of a tip at a corner
@@ -74,8 +76,8 @@ def weave_offsets(weave: Weave, s: Array) -> tuple[Array, Array]:
     return strokes.points[stroke] + done[:, None] * move, (rate / width)[:, None] * move
 
 
-def weave_knots(weave: Weave, length: float) -> Array:
-    """Lengths in [m] from the start of a seam at which a weave is joined, up to its end, shape (M,)."""
+def weave_knots(weave: Weave, length: float, *, others: Sequence[float] = ()) -> Array:
+    """Lengths in [m] from the start of a seam at which a weave or something else is joined, up to its end."""
     if weave.form is WeaveForm.CIRCLE:
         inside, lead = np.linspace(0.0, weave.wavelength, 5)[:-1], 0.0
     else:
@@ -84,10 +86,24 @@ def weave_knots(weave: Weave, length: float) -> Array:
         ramps = TURN * np.diff(ends) if weave.form is not WeaveForm.SINE else np.zeros(len(ends) - 1)
         inside = np.unique(np.concatenate([ends[:-1], ends[:-1] + ramps, ends[1:] - ramps]))
         inside = inside[inside < ends[-1]]
-    periods = np.arange(int(np.ceil((length + lead) / weave.wavelength)))[:, None] * weave.wavelength
-    knots = np.sort((periods + inside).ravel() - lead)
+    knots = np.sort(np.append((_periods(weave, length + lead) + inside).ravel() - lead, others))
     apart = SAME_KNOT * weave.wavelength
     return knots[(knots > apart) & (knots < length - apart) & (np.diff(knots, prepend=-np.inf) > apart)]
+
+
+def standing_travel(weave: Weave, line: Curve, arc: ArcLength) -> StandingTravel:
+    """The travel of a tip along a line with a length that stands for the dwells of its weave."""
+    strokes = _Strokes.of(weave)
+    is_rest = ~np.diff(strokes.points, axis=0).any(axis=1)
+    starts = _periods(weave, arc.total + strokes.lead) - strokes.lead
+    begins, ends = ((starts + it[is_rest]).ravel().tolist() for it in (strokes.ends[:-1], strokes.ends[1:]))
+    rate = weave.wavelength / (weave.wavelength - sum(weave.dwells))
+    return StandingTravel.of(line, arc, list(zip(begins, ends, strict=True)), rate=rate)
+
+
+def _periods(weave: Weave, length: float) -> Array:
+    """Lengths in [m] at which the periods of a weave begin, as many as a length takes, shape (n, 1)."""
+    return weave.wavelength * np.arange(0.0, np.ceil(length / weave.wavelength))[:, None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -127,6 +143,7 @@ class WovenCurve:
     arc: ArcLength  # its length
     weave: Weave
     directions: tuple[tuple[int, BezierCurve], ...]  # unit vectors of the offsets that are not zero
+    travel: StandingTravel | None  # of a tip that stands for the dwells; None of one that travels evenly
     knots: Array
 
     @classmethod
@@ -138,37 +155,55 @@ class WovenCurve:
             for k in np.flatnonzero(moves).tolist()
         )
         whole = (float(line.knots[0]), float(line.knots[-1]))
-        joints = arc.parameters(weave_knots(weave, arc.total), whole)
-        knots = np.unique(np.concatenate([joints, *(curve.knots for _, curve in directions)]))
-        return cls(line=line, arc=arc, weave=weave, directions=directions, knots=knots)
+        knots = np.unique(np.concatenate([curve.knots for _, curve in directions]))
+        travel = standing_travel(weave, line, arc) if weave.stands else None
+        others = () if travel is None else travel.joints.tolist()
+        joints = arc.parameters(weave_knots(weave, arc.total, others=others), whole)
+        knots = np.union1d(joints, knots if travel is None else travel.knots(knots))
+        return cls(line=line, arc=arc, weave=weave, directions=directions, travel=travel, knots=knots)
 
     def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:
         """Points and derivatives."""
-        p, dp = self.line.evaluate(u, interval)
-        speed = np.linalg.norm(dp, axis=1, keepdims=True)
         offsets, rates = weave_offsets(self.weave, self.arc.lengths(u))
+        speed = np.linalg.norm(self.line.evaluate(u, interval)[1], axis=1, keepdims=True)
+        v, within, pace = (u, interval, 1.0) if self.travel is None else self.travel.at(u, interval)
+        p, dp = self.line.evaluate(v, within)
+        dp = pace * dp
         for k, curve in self.directions:
-            d, dd = curve.evaluate(u, interval)
+            d, dd = curve.evaluate(v, within)
             p = p + offsets[:, k, None] * d
-            dp = dp + speed * rates[:, k, None] * d + offsets[:, k, None] * dd
+            dp = dp + speed * rates[:, k, None] * d + offsets[:, k, None] * pace * dd
         return p, dp
 
 
-def woven_path(task: Task, weave: Weave, drawing: PathCurve, arc: ArcLength, orientation: Orientation) -> WovenCurve:
-    """The curve of a tip that weaves about the path of a task.
+class WovenPath(NamedTuple):
+    """What a tip that weaves follows."""
+
+    tip: WovenCurve
+    orientation: Orientation
+    seam: SeamPlaces | None
+
+
+def woven_path(task: Task, weave: Weave, drawing: PathCurve, arc: ArcLength, orientation: Orientation) -> WovenPath:
+    """What a tip that weaves about the path of a task follows.
 
     Raises:
-        InputError: The tip would jump at a corner.
+        InputError: The tip would jump at a corner, or stand elsewhere than the path stops.
     """
     curve = WovenCurve.of(drawing.curve, arc, weave, orientation)
     stops = drawing.stops
     for before, here, after in zip(stops[:-2], stops[1:-1], stops[2:], strict=True):
         u = np.array([here])
         sides = [curve.evaluate(u, interval)[0][0] for interval in ((before, here), (here, after))]
-        if np.linalg.norm(sides[1] - sides[0]) > NO_JUMP:
+        if weave.stands or np.linalg.norm(sides[1] - sides[0]) > NO_JUMP:
+            why = "would stand on before and after it" if weave.stands else "would jump"
             raise InputError(
                 f"{task.where('path.weave')}: expected corners that are rounded, as a weave across each side "
-                f"would jump at {in_mm(drawing.curve.evaluate(u, (before, here))[0][0])}; write corners: "
+                f"{why} at {in_mm(drawing.curve.evaluate(u, (before, here))[0][0])}; write corners: "
                 "{blend_mm: 5}"
             )
-    return curve
+    travel, seam = curve.travel, drawing.seam
+    if travel is not None:
+        orientation = StandingFrame(frame=orientation, travel=travel)
+        seam = None if seam is None else RerunSeam(seam=seam, rerun=travel)
+    return WovenPath(curve, orientation, seam)

@@ -153,6 +153,8 @@ def _with_lines(
             by_joints[entry.name] = (
                 "its file states several feeds or rapids, which lines do not hold; write --format csv"
             )
+        if entry.robot in frame.robots and entry.weave is not None and entry.weave.stands:
+            by_joints[entry.name] = "it stands at the edges of its weave, which lines do not hold; write --format csv"
     if frame.moves is Moves.LINEAR and by_joints:
         raise NotVerifiedError([f"--moves linear: task '{name}': {reason}" for name, reason in by_joints.items()])
     limits = LineLimits(most, dialect.smallest_zone)

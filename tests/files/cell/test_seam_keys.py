@@ -133,6 +133,10 @@ def test_times_of_a_weave_become_lengths_at_the_feed(load: Load) -> None:
 @pytest.mark.parametrize(
     ("weave", "message"),
     [
+        (
+            "side_mm: 3, wavelength_mm: 4, dwell: standing",
+            "c:19: tasks.ring.path.weave.dwell: expected dwell_left_s or dwell_right_s beside it, got neither",
+        ),
         ("side_mm: 3", "c:19: tasks.ring.path.weave: expected either wavelength_mm or frequency_hz, got neither"),
         (
             "side_mm: 3, wavelength_mm: 4, form: triangle",
@@ -193,6 +197,15 @@ def test_controller_that_weaves_leaves_the_rows_on_the_path(load: Load) -> None:
 
     assert cell.tasks[0].weave is None
     assert ("tasks.ring.path.weave", "the controller of 'worker' weaves, rows stay on the path") in cell.remarks
+
+
+def test_controller_that_weaves_stands_nowhere(refuse: Refuse) -> None:
+    task, *rest = woven_by_controller(2.0)
+    standing = (task[0], task[1].replace("wavelength_mm: 4", "wavelength_mm: 4, dwell_left_s: 0.1, dwell: standing"))
+    assert refuse(standing, *rest) == [
+        "c:20: tasks.ring.path.weave.dwell: expected moving, as controllers.welder weaves and would be behind the "
+        "feed, got standing"
+    ]
 
 
 def test_controller_that_weaves_by_another_amplitude_is_refused(refuse: Refuse) -> None:

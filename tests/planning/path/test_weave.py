@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
+from cellplan.geometry.curves.arc_length import measure
+from cellplan.geometry.curves.curve import straight_sides
 from cellplan.geometry.curves.seam_line import SeamAngles
 from cellplan.geometry.shapes import Box
 from cellplan.model.settings.task import ProcessEntry
@@ -18,7 +20,8 @@ from cellplan.model.task.clocked_path import on_line, travel_speeds
 from cellplan.model.task.seam import Seam, WallPlace, Weave, WeaveForm
 from cellplan.model.task.task import SpacePolylinePath, Task, TimeLaw, TimeLawKind
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.path.weave import weave_knots, weave_offsets
+from cellplan.planning.path.standing import TURN
+from cellplan.planning.path.weave import standing_travel, weave_knots, weave_offsets
 from cellplan.planning.timing.schedule import clock_path, schedule_tasks
 
 PLATE = part_of(Box((0.6, 0.6, 0.1)))
@@ -27,7 +30,12 @@ CORNER = SpacePolylinePath(points=((-0.1, 0.0, 0.05), (0.1, 0.0, 0.05), (0.1, 0.
 FILLET = Seam(walls={"plate": EZ, "tube": WallPlace.LEFT}, angles=SeamAngles(face="plate", work=0.7, travel=0.2))
 SINE = Weave(form=WeaveForm.SINE, side=0.003, wavelength=0.005)
 DWELLING = Weave(form=WeaveForm.SINE, side=0.003, wavelength=0.005, dwells=(0.001, 0.0005))
+STANDING = Weave(form=WeaveForm.SINE, side=0.003, wavelength=0.005, dwells=(0.001, 0.0005), stands=True)
 FORMS = {
+    "standing": STANDING,
+    "standing on one side": Weave(
+        form=WeaveForm.ZIGZAG, side=0.002, wavelength=0.006, dwells=(0.0, 0.002), stands=True
+    ),
     "sine": SINE,
     "dwelling": DWELLING,
     "zigzag": Weave(form=WeaveForm.ZIGZAG, side=0.002, wavelength=0.006, dwells=(0.0, 0.001)),
@@ -54,6 +62,54 @@ def test_twists_are_the_derivatives_of_poses(form: str, place: str) -> None:
     path = build_toolpath(task, part)
     h = 1e-5 * path.length
     assert residual_of_twists(path) <= 4.0 * h**2 / 6.0 * (10.0 * np.pi / weave.wavelength) ** 3 * weave.side + 1e-6
+
+
+@pytest.mark.parametrize("place", ["line", "tube"])
+def test_tool_stands_for_the_dwells_and_travels_at_the_feed_in_the_mean(place: str) -> None:
+    task = {
+        "line": welded(LINE, STANDING),
+        "tube": welded(circle(), STANDING, tool_axis=None, seam=FILLET, plane_offset=0.05),
+    }[place]
+    path = build_toolpath(task, PLATE)
+    moving = STANDING.wavelength - sum(STANDING.dwells)
+    starts = np.arange(20.0) * STANDING.wavelength + 0.25 * moving  # the left edge is reached a quarter stroke later
+    inside = np.linspace(0.01, 0.99, 7) * STANDING.dwells[0]
+    X = path.poses((starts[:, None] + inside).ravel()).reshape(20, 7, 4, 4)
+
+    assert np.abs(X - X[:, :1]).max() <= 1e-12
+    on_seam = path.without_weave
+    at_periods = np.arange(21.0) * STANDING.wavelength
+    off = path.poses(at_periods)[:, :3, 3] - on_seam.poses(at_periods)[:, :3, 3]
+    assert np.linalg.norm(off, axis=1).max() <= 1e-9  # after whole periods it is where even travel would be
+    ends = path.poses(np.array([path.length]))[0, :3, 3] - on_seam.poses(np.array([path.length]))[0, :3, 3]
+    assert np.linalg.norm(ends) <= STANDING.side * (1.0 + 1e-9)
+
+
+@settings(max_examples=30)
+@given(
+    length=st.floats(0.002, 0.1), left=st.floats(0.01, 0.4), right=st.floats(0.0, 0.4), wavelength=st.floats(2e-3, 9e-3)
+)
+def test_travel_that_stands_never_turns_back_and_ends_with_the_seam(
+    length: float, left: float, right: float, wavelength: float
+) -> None:
+    dwells = (left * wavelength, right * wavelength)
+    weave = Weave(form=WeaveForm.SINE, side=0.003, wavelength=wavelength, dwells=dwells, stands=True)
+    line = straight_sides(np.array([0.0, length]), np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0]]))
+    travel = standing_travel(weave, line, measure(line))
+    u = np.linspace(0.0, length, 501)
+    reached = travel.at(u, travel.whole)[0]
+
+    assert reached[0] == pytest.approx(0.0, abs=1e-15)
+    assert reached[-1] == pytest.approx(length, rel=1e-12)
+    assert np.diff(reached).min() >= -1e-12
+    assert np.abs(reached - u).max() <= 2.0 * max(dwells) + TURN * wavelength  # the ramps of moves
+    knots = np.linspace(0.01, 0.99, 9) * length
+    assert np.abs(travel.at(travel.knots(knots), travel.whole)[0] - knots).max() <= 1e-9 * length
+
+
+def test_corner_at_which_a_tool_stops_that_stands_at_its_edges_is_refused() -> None:
+    with pytest.raises(InputError, match="would stand on before and after it"):
+        build_toolpath(welded(CORNER, STANDING), PLATE)
 
 
 def test_sine_on_a_line_is_the_sine_to_the_left_of_travel() -> None:

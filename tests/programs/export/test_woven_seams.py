@@ -96,3 +96,15 @@ def test_rows_weave_elsewhere_and_travel_at_the_feed(tmp_path: Path) -> None:
     report = json.loads((tmp_path / "run" / "work-1" / "report.json").read_text(encoding="utf-8"))
     speed = report["tasks"]["seam"]["process_speed"]
     assert speed["peak_mm_s"] == pytest.approx(8.0, rel=1e-3)  # of travel: the tip itself is faster
+
+
+def test_lines_of_a_tool_that_stands_at_the_edges_of_its_weave_are_refused(tmp_path: Path) -> None:
+    dwells = "wavelength_mm: 4, dwell_left_s: 0.1, dwell: standing"
+    text = CELL.replace("weave_mm: 2", "weave_mm: 0").replace("wavelength_mm: 4", dwells)
+    (tmp_path / "cell.yaml").write_text(text, encoding="utf-8")
+    status, out, error = run_command("cellplan solve cell.yaml -o run", tmp_path)
+    assert status == 0, out + error
+
+    status, _, error = run_command("cellplan export run --format rapid --moves linear --cell cell.yaml", tmp_path)
+    assert status != 0
+    assert "task 'seam': it stands at the edges of its weave, which lines do not hold" in error

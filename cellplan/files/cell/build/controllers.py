@@ -240,6 +240,9 @@ def _process_weaves(valid: ValidEntries, document: YamlDocument) -> Iterator[Fin
             if weave is not None and weave.side_mm != most:
                 text = f"expected {most:g}, as controllers.{name}.process.weave_mm weaves, got {weave.side_mm:g}"
                 yield document.finding(("tasks", task, "path", "weave", "side_mm"), text)
+            if weave is not None and weave.dwell == "standing":
+                text = f"expected moving, as controllers.{name} weaves and would be behind the feed, got standing"
+                yield document.finding(("tasks", task, "path", "weave", "dwell"), text)
 
 
 def _in_process(controller: str, valid: ValidEntries) -> Iterator[str]:

@@ -158,4 +158,5 @@ def _weave(entry: WeaveEntry, task: TaskEntry) -> Weave:
         wavelength=entry.wavelength_mm.si if entry.wavelength_mm is not None else feed / (entry.frequency_hz or 1.0),
         dwells=(feed * entry.dwell_left_s, feed * entry.dwell_right_s),
         out=(entry.out_mm or Mm(0.0)).si,
+        stands=entry.dwell == "standing",
     )
