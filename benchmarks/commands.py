@@ -66,6 +66,12 @@ COMMANDS = (
         goal_s=1.0,
         status=2,
     ),
+    Command(
+        name="recover, refused",
+        arguments=("-m", "cellplan", "recover", RUN, "--at", "1000", "--cell", CELL, "--quiet"),
+        goal_s=1.0,
+        status=2,
+    ),
     Command(name="check", arguments=("-m", "cellplan", "check", CELL, "--quiet")),
     Command(
         name="solve",

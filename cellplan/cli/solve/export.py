@@ -94,10 +94,11 @@ def export(options: ExportOptions) -> Result:
     several each is written or refused by itself; 1 or 2 if one that was named is refused, or all are.
     """
     from cellplan.files.cell.reader_process import begin_reading
+
+    begin_reading(options.cell)
     from cellplan.programs.export.exporters import chosen_formats, refuse_choice
 
     formats = chosen_formats(options.forms)
-    begin_reading(options.cell)
     from cellplan.files.run.folder import PROGRAMS
     from cellplan.programs.export.refusals import (
         NothingFitsError,

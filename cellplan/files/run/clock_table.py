@@ -77,6 +77,12 @@ def parse_clock(text: str, source: str) -> ClockText:
     return ClockText(table=table, cell=cell, program=program, first_line=5)
 
 
+def last_time(text: str, source: str) -> float:
+    """Time of the last row of a clock in [s], read without the rows before it."""
+    time = text.rstrip("\n").rpartition("\n")[2].partition(",")[0]
+    return float(time if re.fullmatch(_NUMBER, time) else parse_clock(text, source).table.times[-1])
+
+
 def _header_lines(cell: str, program: str) -> list[str]:
     return [f"# {TITLE}", f"# cell: {cell}", f"# program digest: sha256 {program}"]
 

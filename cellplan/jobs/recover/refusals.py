@@ -39,6 +39,7 @@ def refuse_recovery(
     run: ReadRun, *, at: float, frozen: Mapping[str, float], keep: Collection[str], formats: Iterable[str]
 ) -> None:
     """Refuse a recovery, and its programs in some formats, of which the files of a run say that they cannot be."""
+    _require_within(run.end(), at, "--at")
     refuse_state(run.cell, run.clock(), at=at, frozen=frozen, keep=keep)
     for form in formats:
         recovery_frame(run, form)
@@ -72,15 +73,19 @@ def standing_times(cell: Cell, at: float, frozen: Mapping[str, float]) -> dict[s
 
 def _require_time(motion: Motion | ClockTable, time: float, option: str) -> None:
     """Refuse a time at which the program has no rows."""
-    end = float(motion.times[-1])
-    if not -END <= time <= end + END:
-        raise InputError(f"{option}: expected a time of the program, 0 to {end:g} s, got {time:g}")
+    _require_within(float(motion.times[-1]), time, option)
     for row, name in motion.gaps.items():
         if motion.times[row - 1] < time < motion.times[row]:
             raise InputError(
                 f"{option}: expected a time at which the program has rows, got {time:g}, in the motion '{name}' that "
                 "is not part of it"
             )
+
+
+def _require_within(end: float, time: float, option: str) -> None:
+    """Refuse a time before or after the program, whose last row is at ``end``; both in [s]."""
+    if not -END <= time <= end + END:
+        raise InputError(f"{option}: expected a time of the program, 0 to {end:g} s, got {time:g}")
 
 
 def recovery_frame(run: AnyRun, form: str) -> ExportFrame:

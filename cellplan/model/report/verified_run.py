@@ -23,6 +23,7 @@ class ReadRun:
     cell: Cell  # the cell that was solved
     motions: tuple[str, ...]  # names of its phases, empty for the only one
     phases: tuple[Phase, ...]  # the phases of its program as the cell has them, not yet on a clock
+    end: Callable[[], float]  # reads the time of its last row in [s] alone
     clock: Callable[[], ClockTable]  # reads the clock of the program, which is compared with the cell with its rows
     rows: Callable[[], Motion]  # reads all rows of the program, once: many refusals need none of them
     names: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of files of other names than those of the run

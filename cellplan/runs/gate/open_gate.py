@@ -8,7 +8,7 @@ from pathlib import Path
 from cellplan.cache import without_cache
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.files.input.findings import listed
-from cellplan.files.run.clock_table import parse_clock
+from cellplan.files.run.clock_table import last_time, parse_clock
 from cellplan.files.run.stored import CELL, CLOCK, StoredRun, read_stored_run
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
@@ -84,13 +84,15 @@ def read_run(stored: StoredRun, cell: Cell) -> ReadRun:
 
 def _read_run(stored: StoredRun, cell: Cell, demanded: DemandedProgram, read: Callable[[], StoredRows]) -> ReadRun:
     """The run as it is before anything is verified."""
+    file = stored.file("", f"tables/{CLOCK}.csv")
     return ReadRun(
         folder=stored.folder,
         digest=stored.digest,
         cell=cell,
         motions=tuple(demanded.labels),
         phases=demanded.plan.program,
-        clock=lambda: parse_clock(stored.clock, stored.file("", f"tables/{CLOCK}.csv")).table,
+        end=lambda: last_time(stored.clock, file),
+        clock=lambda: parse_clock(stored.clock, file).table,
         rows=lambda: read().motion,
     )
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cellplan.errors import InputError
-from cellplan.files.run.clock_table import parse_clock, render_clock
+from cellplan.files.run.clock_table import last_time, parse_clock, render_clock
 from cellplan.files.run.joint_tables import line_of_row, with_gap_lines, without_gap_lines
 from cellplan.model.motion.motion import ClockTable
 
@@ -49,6 +49,12 @@ def test_what_is_written_is_what_is_read() -> None:
         assert read.table.lengths[task] == pytest.approx(TABLE.lengths[task], abs=1e-15)
         assert np.array_equal(read.table.process[task], TABLE.process[task])
     assert render_clock(read.table, cell=read.cell, program=read.program) == TEXT
+
+
+def test_the_last_time_is_that_of_the_last_row() -> None:
+    assert last_time(TEXT, "clock.csv") == 0.3
+    with pytest.raises(InputError, match=r"^c:9: expected time_s"):
+        last_time(TEXT.replace("\n0.3,", "\nlate,"), "c")
 
 
 @pytest.mark.parametrize(

@@ -153,9 +153,9 @@ def test_what_a_cell_with_the_part_at_rest_does_not_state_is_refused_without_row
     assert "robots.left.controller.handshake.inputs: expected the input that 'right' sets" in str(refusal.value)
 
 
-def test_a_time_after_the_end_of_a_program_is_refused_by_its_clock(read: ReadRun) -> None:
+def test_a_time_after_the_end_of_a_program_is_refused_by_the_last_row_of_its_clock(read: ReadRun) -> None:
     with pytest.raises(InputError) as refusal:
-        refuse_recovery(replace(read, rows=no_rows), at=99.0, frozen={}, keep=(), formats=())
+        refuse_recovery(replace(read, rows=no_rows, clock=no_rows), at=99.0, frozen={}, keep=(), formats=())
 
     assert str(refusal.value) == f"--at: expected a time of the program, 0 to {read.motion.times[-1]:g} s, got 99"
 

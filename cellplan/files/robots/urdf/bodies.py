@@ -7,7 +7,6 @@ from typing import Final
 from urllib.parse import unquote
 
 from cellplan.errors import InputError
-from cellplan.files.input.files import AllowedFolders
 from cellplan.files.input.findings import listed, shown
 from cellplan.files.robots.urdf.document.document import UrdfLink, UrdfMesh, UrdfSolid
 from cellplan.files.robots.urdf.document.packages import Packages, is_file
@@ -24,9 +23,7 @@ PACKAGE: Final = "package://"
 class MeshShelf:
     """Finds and reads the mesh files of one URDF, each once."""
 
-    folder: Path  # folder of the URDF
-    package_dirs: tuple[Path, ...]  # folders that hold packages (or are one)
-    within: AllowedFolders | None = None  # folders that a mesh must lie in to be read; None for all
+    packages: Packages  # folders that names of meshes are looked up in
     files: list[Path] = field(default_factory=list)  # mesh files read so far, in the order of first use
     remarks: Remarks = field(default_factory=Remarks)  # names of meshes that only some programs understand
     _read: dict[tuple[Path, tuple[float, float, float]], Mesh] = field(default_factory=dict)
@@ -36,7 +33,7 @@ class MeshShelf:
         name = PurePosixPath(desired.uri)
         if name.suffix and name.suffix.lower() not in FORMATS:
             raise unknown_format(name.name)
-        path, remark = find_mesh(desired.uri, self.folder, package_dirs=self.package_dirs, within=self.within)
+        path, remark = find_mesh(desired.uri, self.packages)
         if remark is not None:
             self.remarks.add(remark, f"mesh {shown(desired.uri)}: {remark}", element)
         key = (path, desired.scale)
@@ -69,23 +66,21 @@ def link_bodies(tree: UrdfTree, configuration: ZeroConfiguration, shelf: MeshShe
     return tuple(bodies)
 
 
-def find_mesh(
-    uri: str, folder: Path, *, package_dirs: tuple[Path, ...], within: AllowedFolders | None = None
-) -> tuple[Path, str | None]:
+def find_mesh(uri: str, packages: Packages) -> tuple[Path, str | None]:
     """File that a mesh name means, and a remark where other programs may read the name otherwise.
 
     ``package://NAME/rest`` is looked up as `Packages` says; ``package:///NAME/rest`` likewise, and where no package is
     named, ``rest`` below the same folders. Other names are relative to the URDF. Absolute paths and ``file://`` count
     below the URDF's folder, a package folder or a folder of ``within``; a name that only begins with a slash is looked
-    up below the first two. Nothing outside the folders ``within`` is accessed.
+    up below the first two. Nothing outside the folders ``within`` of the packages is accessed.
 
     An ``InputError`` names every place that was tried.
     """
+    within = packages.within
     if uri.startswith(PACKAGE):
-        packages = Packages(folder=folder, package_dirs=package_dirs, within=within)
         tried = _package_places(uri.removeprefix(PACKAGE), packages)
     else:
-        tried = _plain_places(uri, folder, package_dirs=package_dirs, within=within)
+        tried = _plain_places(uri, packages)
     inside = [place for place in tried if within is None or within.holds(place)]
     if tried and not inside:
         raise InputError(
@@ -111,10 +106,9 @@ def _package_places(name: str, packages: Packages) -> dict[Path, str | None]:
     return dict.fromkeys(places, remark or (None if is_usual else "has too many slashes, read as package://NAME/path"))
 
 
-def _plain_places(
-    uri: str, folder: Path, *, package_dirs: tuple[Path, ...], within: AllowedFolders | None
-) -> dict[Path, str | None]:
+def _plain_places(uri: str, packages: Packages) -> dict[Path, str | None]:
     """Places of a file named by a path or by ``file://``, and what is unusual about its name at each."""
+    folder, package_dirs, within = packages.folder, packages.package_dirs, packages.within
     scheme, mark, rest = uri.partition("://")
     if mark and scheme != "file":
         raise InputError(f"expected a path, package:// or file://, got {scheme}://")

@@ -10,6 +10,7 @@ from typing import Final
 from cellplan.errors import InputError
 from cellplan.files.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.files.robots.urdf.document.document import read_document
+from cellplan.files.robots.urdf.document.packages import Packages
 from cellplan.files.robots.urdf.drawings import edges_of_box, small_bodies
 from cellplan.files.robots.urdf.flange import axis_along, choose_flange, flange_remarks, is_along, last_joint
 from cellplan.files.robots.urdf.limits import MissingLimits, limits_to_state, missing_limits, with_blanks
@@ -43,7 +44,7 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
     choices = tuple(_choices(tree))
     flange, is_usual = _flange(tree, choices, options.flange)
     structure = urdf_structure(tree, flange, options)
-    shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs)
+    shelf = MeshShelf(Packages(folder=path.parent, package_dirs=options.package_dirs))
     bodies = link_bodies(tree, structure.configuration, shelf)
     missing = missing_limits(structure.roles.driven, {})
     model = None if missing else urdf_model(structure, bodies, limits={}, source=path.name)
@@ -87,7 +88,7 @@ def cell_lines(name: str, entry: Mapping[str, object]) -> str:
 
 def _elsewhere(path: Path, tree: UrdfTree, shelf: MeshShelf) -> Iterator[str]:
     """What a cell in the current folder needs to read files that lie elsewhere."""
-    folders = [*shelf.package_dirs, *(file.parent for file in (path, *tree.document.included, *shelf.files))]
+    folders = [*shelf.packages.package_dirs, *(file.parent for file in (path, *tree.document.included, *shelf.files))]
     outside = [folder.resolve() for folder in folders if not folder.resolve().is_relative_to(Path.cwd())]
     for drive in dict.fromkeys(folder.anchor for folder in outside):
         shared = os.path.commonpath([folder for folder in outside if folder.anchor == drive])

@@ -30,7 +30,7 @@ def shape_solids(link: UrdfLink, shelf: MeshShelf, *, largest: float = np.inf) -
             if not isinstance(solid.shape, UrdfMesh):
                 solids.append((solid.shape, solid.X_LS))
                 continue
-            path, _ = find_mesh(solid.shape.uri, shelf.folder, package_dirs=shelf.package_dirs, within=shelf.within)
+            path, _ = find_mesh(solid.shape.uri, shelf.packages)
             if path.stat().st_size > largest:
                 return []
             solids.append((shelf.mesh(solid.shape, element), solid.X_LS))
@@ -54,7 +54,7 @@ def small_bodies(
 
     What is read from the shelf here is no input of the robot.
     """
-    apart = MeshShelf(folder=shelf.folder, package_dirs=shelf.package_dirs, within=shelf.within)
+    apart = MeshShelf(shelf.packages)
     for link in links_in_order(tree):
         X_LB = inverse(configuration.X_BL[link.name])
         solids = [(body.shape, X_LB @ body.X_BS) for body in bodies if body.link_name == link.name]

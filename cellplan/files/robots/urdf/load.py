@@ -11,6 +11,7 @@ from cellplan.files.input.files import AllowedFolders
 from cellplan.files.robots.limits import StatedLimits, rates_of
 from cellplan.files.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.files.robots.urdf.document.document import UrdfDocument, UrdfJoint, read_document
+from cellplan.files.robots.urdf.document.packages import Packages
 from cellplan.files.robots.urdf.document.xacro import XacroSettings
 from cellplan.files.robots.urdf.drawings import small_bodies
 from cellplan.files.robots.urdf.flange import choose_flange, flange_remarks
@@ -113,7 +114,7 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         errors.insert(0, unlocked_error(tree, structure.flange, structure.unlocked, options.locked))
     if errors:
         raise errors[0] if len(errors) == 1 else InvalidFileError(errors)
-    shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
+    shelf = MeshShelf(Packages(folder=path.parent, package_dirs=options.package_dirs, within=options.within))
     bodies = link_bodies(tree, structure.configuration, shelf)
     model = urdf_model(structure, bodies, limits=options.limits, source=path.name)
     require_opposed(tree, options.gripper, locks=held, configuration=structure.configuration, bodies=model.bodies)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from cellplan.files.robots.urdf.bodies import MeshShelf
 from cellplan.files.robots.urdf.document.document import read_document
+from cellplan.files.robots.urdf.document.packages import Packages
 from cellplan.files.robots.urdf.drawings import shape_solids
 from cellplan.files.robots.urdf.load import UrdfOptions
 from cellplan.geometry.shapes import Solid
@@ -25,7 +26,7 @@ def read_visuals(path: Path, options: UrdfOptions) -> tuple[Visual, ...]:
 
     A link of which one cannot be read is left out: it is drawn by its bodies.
     """
-    shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
+    shelf = MeshShelf(Packages(folder=path.parent, package_dirs=options.package_dirs, within=options.within))
     visuals: list[Visual] = []
     for link in read_document(path, options.xacro).links.values():
         if link.element.all("collision"):

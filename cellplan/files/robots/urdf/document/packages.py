@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -19,11 +19,13 @@ LIKELY_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Packages:
-    """Where packages are looked up."""
+    """Where packages are looked up, each name once."""
 
     folder: Path  # folder of the file that names them
     package_dirs: tuple[Path, ...] = ()  # folders that hold packages, or are one
     within: AllowedFolders | None = None  # folders that a package must lie in; None for all
+    # by name of a package, its folders with the names that these state
+    _known: dict[str, dict[Path, str]] = field(default_factory=dict, compare=False)
 
     def places(self, package: str, rest: str) -> tuple[list[Path], str | None]:
         """Where a file of a package lies or would lie, and a remark where no folder is the package beyond doubt.
@@ -36,11 +38,13 @@ class Packages:
         Returns:
             Paths within the allowed folders, at least one, those of existing files first; and the remark or None.
         """
-        folders = dict.fromkeys(self._named(package))
-        stated = [folder for folder in folders if _stated_name(folder) in ("", package)]
+        if package not in self._known:
+            self._known[package] = {folder: _stated_name(folder) for folder in self._named(package)}
+        folders = self._known[package]
+        stated = [folder for folder, name in folders.items() if name in ("", package)]
         places = [folder / rest for folder in stated or folders]
         if places:
-            others = "" if stated else _stated_name(next(iter(folders)))
+            others = "" if stated else next(iter(folders.values()))
             remark = f"is read from a folder of that name, whose {MANIFEST} states {shown(others)}" if others else None
             return sorted(places, key=lambda place: not self._holds_file(place)), remark
         for root in self.roots:
