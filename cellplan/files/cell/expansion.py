@@ -3,16 +3,18 @@
 Findings about what an entry stands for name the keys from which it comes.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise, zip_longest
 from math import floor, hypot, pi
 from typing import Any, Final
 
+from cellplan.files.cell.changes import changed
 from cellplan.files.input.findings import Finding, KeyPath
 from cellplan.files.schema.expansion import MOST_PARTS, StitchEntry, TacksEntry
 from cellplan.files.schema.messages import valid_entry
 from cellplan.files.schema.path import PathShapeEntry, PolylineEntry
+from cellplan.files.schema.seam import PathEntry
 from cellplan.files.schema.task import TaskEntry
 from cellplan.files.yaml.reader import YamlDocument
 
@@ -25,6 +27,8 @@ NO_PARTS: Final = f"expected 1 to {MOST_PARTS} of them on the path; of a path fr
 EXCLUDES: Final = {"push_deg": "drag_deg", "drag_deg": "push_deg"}
 ROUNDING: Final = 1e-9  # [-] of a number of stitches
 DECIMALS: Final = 9  # of a length in [mm] that is worked out
+OF_EDGES: Final = "part.step"  # entry on which the lengths of edges depend
+EdgeLength = Callable[[YamlDocument, PathEntry], float | None]  # length in [mm] of a path along edges, None if unknown
 
 
 class _NoPartsError(Exception):
@@ -49,7 +53,27 @@ class _Part:
         self.sources[path] = source
 
 
-def expanded(document: YamlDocument) -> YamlDocument:
+def with_values(entries: YamlDocument, values: Mapping[str, object], edge_length: EdgeLength) -> YamlDocument:
+    """The expanded document of entries with other values by address.
+
+    Those of an entry that stands for other tasks are set before it is expanded, all others afterwards.
+    """
+    whole = expanded(entries, edge_length)
+    early = {address: value for address, value in values.items() if is_of_entry(address, entries, whole)}
+    whole = expanded(changed(entries, early), edge_length) if early else whole
+    return changed(whole, {address: value for address, value in values.items() if address not in early})
+
+
+def is_of_entry(address: str, entries: YamlDocument, whole: YamlDocument) -> bool:
+    """Whether an address leads to what parts are made of: an entry that is no task of the whole document itself."""
+    section, name, key, *_ = (*address.split(".", 3), "", "")
+    names, parts = (it.root.get("tasks") for it in (entries, whole))
+    if section != "tasks" or not isinstance(names, dict) or not isinstance(parts, dict):
+        return address.startswith(OF_EDGES)
+    return name in names and (key.split("[", maxsplit=1)[0] in EXPANDED or name not in parts)
+
+
+def expanded(document: YamlDocument, edge_length: EdgeLength) -> YamlDocument:
     """The document with all tasks that others stand for, in their order, and with their names where these are named."""
     tasks = document.root.get("tasks")
     if not isinstance(tasks, dict) or not any(
@@ -62,9 +86,12 @@ def expanded(document: YamlDocument) -> YamlDocument:
         entry = valid_entry(TaskEntry, document, ("tasks", name)) if isinstance(task, dict) else None
         if entry is None or not set(EXPANDED) & set(task):
             continue
+        length = edge_length(document, entry.path) if entry.path.is_edge else stated_length(entry.path)
         try:
-            made = list(_parts(name, task, entry, has_program="program" in document.root))
+            made = list(_parts(name, task, entry, length=length, has_program="program" in document.root))
         except _NoPartsError as error:
+            if entry.path.is_edge and length is None:
+                continue  # its edges or their file are wrong, and say so
             findings.append(document.finding(("tasks", name, error.args[0]), NO_PARTS))
             continue
         taken = next((it.name for it in made if it.name in tasks and it.name != name), None)
@@ -75,12 +102,14 @@ def expanded(document: YamlDocument) -> YamlDocument:
     return _with_parts(replace(document, findings=(*document.findings, *findings)), parts)
 
 
-def _parts(name: str, task: Mapping[str, Any], entry: TaskEntry, *, has_program: bool) -> Iterator[_Part]:
-    """The tasks that a task stands for, each after the one before it."""
+def _parts(
+    name: str, task: Mapping[str, Any], entry: TaskEntry, *, length: float | None, has_program: bool
+) -> Iterator[_Part]:
+    """The tasks that a task stands for, each after the one before it; ``length`` is that of its path in [mm]."""
     if entry.skip:
         return
     plain = {key: value for key, value in task.items() if key not in EXPANDED}
-    made = [*_tacks(name, plain, entry), *_seams(name, plain, entry)]
+    made = [*_tacks(name, plain, entry, length), *_seams(name, plain, entry, length)]
     for before, part in zip([None, *made], made, strict=False):
         if before is not None:
             part.values = {key: value for key, value in part.values.items() if key not in OF_START}
@@ -89,14 +118,14 @@ def _parts(name: str, task: Mapping[str, Any], entry: TaskEntry, *, has_program:
         yield part
 
 
-def _seams(name: str, plain: Mapping[str, Any], entry: TaskEntry) -> Iterator[_Part]:
+def _seams(name: str, plain: Mapping[str, Any], entry: TaskEntry, length: float | None) -> Iterator[_Part]:
     """The passes or the stitches of a seam, or the seam alone, each with its crater."""
     made = [_Part(name=name, values=dict(plain))]
     if entry.passes is not None:
         made = [_pass(f"{name}_{k + 1}", plain, entry, k) for k in range(len(entry.passes))]
     elif entry.stitch is not None:
         pitch = entry.stitch.length_mm + entry.stitch.gap_mm
-        spans = _spans(entry.path, entry.stitch, pitch)
+        spans = _spans(entry.path, entry.stitch, pitch, length)
         made = [_stretch(f"{name}_{k + 1}", plain, span, "stitch") for k, span in enumerate(spans)]
     for part in made:
         if entry.crater is not None:
@@ -105,9 +134,10 @@ def _seams(name: str, plain: Mapping[str, Any], entry: TaskEntry) -> Iterator[_P
         yield part
 
 
-def _tacks(name: str, plain: Mapping[str, Any], entry: TaskEntry) -> Iterator[_Part]:
+def _tacks(name: str, plain: Mapping[str, Any], entry: TaskEntry, length: float | None) -> Iterator[_Part]:
     """The tacks before a seam, without its weave."""
-    spans = _spans(entry.path, entry.tacks, float(entry.tacks.pitch_mm)) if entry.tacks is not None else ()
+    tacks = entry.tacks
+    spans = _spans(entry.path, tacks, float(tacks.pitch_mm), length) if tacks is not None else ()
     for k, span in enumerate(spans):
         part = _stretch(f"{name}_t{k + 1}", plain, span, "tacks")
         part.values["path"] = {key: value for key, value in part.values["path"].items() if key != "weave"}
@@ -142,10 +172,12 @@ def _stretch(name: str, plain: Mapping[str, Any], span: tuple[float, float], sou
     return part
 
 
-def _spans(path: Any, entry: StitchEntry | TacksEntry, pitch: float) -> Sequence[tuple[float, float]]:
+def _spans(
+    path: PathEntry, entry: StitchEntry | TacksEntry, pitch: float, length: float | None
+) -> Sequence[tuple[float, float]]:
     """Begins and ends of stitches or tacks in [mm] along the path, in the order in which it is run along."""
     begin = float(path.from_mm or 0.0)
-    end = float(path.to_mm) if path.to_mm is not None else stated_length(path)
+    end = float(path.to_mm) if path.to_mm is not None else length
     count = entry.count
     if count is None and end is not None:
         count = floor((end - begin - entry.length_mm) / pitch + ROUNDING) + 1

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -27,7 +28,7 @@ from cellplan.files.cell.build.mounting import (
 from cellplan.files.cell.build.path import is_woven_by_controller
 from cellplan.files.cell.build.srdf import apply_srdfs
 from cellplan.files.cell.changes import changed, plain_values
-from cellplan.files.cell.expansion import expanded
+from cellplan.files.cell.expansion import is_of_entry, with_values
 from cellplan.files.cell.layout.build_layout import read_layout
 from cellplan.files.cell.names import with_stated_names
 from cellplan.files.cell.open_tasks import open_task_findings, open_tasks, unknown_robot_findings, with_first_robots
@@ -37,7 +38,7 @@ from cellplan.files.cell.rules.program_rules import posture_findings, program_fi
 from cellplan.files.cell.rules.rules import Targets, rule_findings, target_findings
 from cellplan.files.cell.rules.solver_rules import solver_findings
 from cellplan.files.cell.rules.task_rules import task_rule_findings
-from cellplan.files.cell.step_parts import edge_lines, read_part
+from cellplan.files.cell.step_parts import edge_length, edge_lines, read_part
 from cellplan.files.cell.user_folders import user_folders
 from cellplan.files.input.files import AllowedFolders
 from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, key_text, raise_findings, shown
@@ -75,7 +76,8 @@ PARTS: Final = (
 class CellFile:
     """The document of a cell, and the folders of the files that it names."""
 
-    document: YamlDocument  # the file, with the values that were changed since
+    entries: YamlDocument  # the file
+    document: YamlDocument  # the same with all tasks that others stand for, and with the values that were changed since
     changes: Mapping[str, object] = field(default_factory=dict)  # by address, in the order in which they were set
     name: str  # name of the file, without folders
     folder: Path  # folder that the names of files start from
@@ -83,6 +85,11 @@ class CellFile:
     parts: Mapping[str, object] = field(default_factory=dict)  # of the cell as built from it, by attribute
     robots: Mapping[str, Sequence[str]] = field(default_factory=dict)  # that may do a task which is open to several
     urdfs: Urdfs = field(default_factory=dict)  # robots of URDFs as they were read
+
+    @property
+    def folders(self) -> AllowedFolders:
+        """The folders that the files which it names may lie in."""
+        return AllowedFolders(folder=self.folder, allowed=(*self.allow_dirs, *user_folders(self.folder)))
 
     @property
     def written(self) -> Mapping[str, Any]:
@@ -97,9 +104,17 @@ class CellFile:
                     f"cell '{cell.name}': expected the cell as it was read, got one whose {key} was changed in Python; "
                     "call with_values first"
                 )
-        document = changed(self.document, values)
         changes = {address: value for address, value in self.changes.items() if address not in values}
+        if any(is_of_entry(address, self.entries, self.document) for address in values):
+            document = self.document_with({**changes, **values})
+            document = with_first_robots(document) if self.robots else document
+        else:
+            document = changed(self.document, values)
         return _read(replace(self, document=document, changes=changes | plain_values(values), urdfs={}))
+
+    def document_with(self, values: Mapping[str, object]) -> YamlDocument:
+        """The document of the file with values in place of its own."""
+        return with_values(self.entries, values, partial(edge_length, folders=self.folders))
 
 
 def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path | None = None) -> Cell:
@@ -115,16 +130,14 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
         InvalidFileError: Everything that is wrong with the cell and the files it names, one located line each.
         InputError: The cell file cannot be read at all.
     """
-    path = Path(path)
-    document = expanded(read_yaml(path, file=str(path)))
-    allowed = tuple(Path(folder) for folder in allow_dirs)
-    return _read(CellFile(document=document, name=path.name, folder=folder or path.parent, allow_dirs=allowed))
+    return _read(_cell_file(Path(path), {}, allow_dirs=allow_dirs, folder=folder))
 
 
 def load_copy(path: Path, cell: Cell) -> Cell:
     """A copy of a cell that was just read from its file: the same folders hold, and URDFs are not read again."""
-    source, document = cast("CellFile", cell.origin.source), expanded(read_yaml(path, file=str(path)))
-    return _read(replace(source, document=document, name=path.name, changes={}))
+    source = cast("CellFile", cell.origin.source)
+    source = replace(source, entries=read_yaml(path, file=str(path)), name=path.name, changes={})
+    return _read(replace(source, document=source.document_with({})))
 
 
 def load_open_cell(
@@ -142,18 +155,26 @@ def load_open_cell(
         InvalidFileError: As ``load_cell``.
         InputError: The cell file cannot be read at all.
     """
-    path = Path(path)
-    document = changed(expanded(read_yaml(path, file=str(path))), values or {})
-    robots = open_tasks(document.root)
-    source = CellFile(
-        document=with_first_robots(document),
-        changes=plain_values(values or {}),
-        name=path.name,
-        folder=path.parent,
-        allow_dirs=tuple(Path(folder) for folder in allow_dirs),
-        robots=robots,
-    )
+    source = _cell_file(Path(path), values or {}, allow_dirs=allow_dirs)
+    document, robots = source.document, open_tasks(source.document.root)
+    source = replace(source, document=with_first_robots(document), robots=robots)
     return _read(source, unknown_robot_findings(document)), robots
+
+
+def _cell_file(
+    path: Path, values: Mapping[str, object], *, allow_dirs: Sequence[Path] = (), folder: Path | None = None
+) -> CellFile:
+    """A cell file as it is read, with values in place of its own."""
+    entries, allowed = read_yaml(path, file=str(path)), tuple(Path(it) for it in allow_dirs)
+    file = CellFile(
+        entries=entries,
+        document=entries,
+        changes=plain_values(values),
+        name=path.name,
+        folder=folder or path.parent,
+        allow_dirs=allowed,
+    )
+    return replace(file, document=file.document_with(values))
 
 
 def with_names(cell: Cell, file: Path) -> Cell:
@@ -178,8 +199,7 @@ def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:
     valid = with_stand_offs(valid)
     findings += rule_findings(valid, document)
     findings += task_rule_findings(valid, document, source.robots)
-    allowed = (*source.allow_dirs, *user_folders(source.folder))
-    sources = Sources(document, AllowedFolders(folder=source.folder, allowed=allowed), source.urdfs)
+    sources = Sources(document, source.folders, source.urdfs)
     sources.inputs[source.name] = document.digest
     valid, models = apply_srdfs(valid, _models(valid, document, sources), sources, document)
     sound = dict(models)

@@ -6,11 +6,13 @@ from typing import Final, TypeVar, cast
 
 from cellplan.errors import InputError
 from cellplan.files.cell.referenced_files import Sources
-from cellplan.files.input.files import digest_of_file
+from cellplan.files.input.files import AllowedFolders, digest_of_file
 from cellplan.files.input.findings import KeyPath, did_you_mean, key_text, shown
+from cellplan.files.schema.messages import valid_entry
 from cellplan.files.schema.partial import ValidEntries
 from cellplan.files.schema.seam import PathEntry
 from cellplan.files.schema.shapes import StepEntry
+from cellplan.files.yaml.reader import YamlDocument
 from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.geometry.step.drawing import StepDrawing, read_drawing
 from cellplan.geometry.step.kernel import require_step
@@ -19,6 +21,7 @@ from cellplan.geometry.step.part import StepPart, read_step_part
 from cellplan.geometry.step.reader import UnknownShapeError
 from cellplan.guard import Guard, in_child
 from cellplan.model.settings.units import in_si
+from cellplan.model.units import MM
 
 Value = TypeVar("Value", StepPart, StepDrawing)
 MEGABYTES: Final = 3000  # of which OpenCASCADE alone takes some hundreds
@@ -75,6 +78,18 @@ def _read(read: Callable[..., Value], place: Path, file: str, shape: str | None,
             del _READ[next(iter(_READ))]
         _READ[key] = content
     return cast("Value", _READ[key]), digest
+
+
+def edge_length(document: YamlDocument, path: PathEntry, folders: AllowedFolders) -> float | None:
+    """Length in [mm] of a path along edges of the part of a document; None where these cannot be read."""
+    root = document.root.get("part")
+    entry = valid_entry(StepEntry, document, ("part", "step")) if isinstance(root, dict) and "step" in root else None
+    place = Sources(document, folders, {}).file(entry.file, ()) if entry is not None else None
+    try:
+        drawing = load_drawing(place, entry.file, entry.shape, entry.gap_mm.si) if entry and place else None
+        return MM * float(edge_line(path, drawing).behind[-1])
+    except InputError:
+        return None  # the path itself says why
 
 
 def edge_lines(valid: ValidEntries, sources: Sources) -> dict[str, SeamLine]:

@@ -36,7 +36,7 @@ class StitchEntry(Entry):
     length_mm: Length = Field(description="Length of each stitch.")
     gap_mm: Length = Field(description="Gap between two stitches.")
     count: Count | None = setting(
-        None, "Number of stitches; as many as the path as it is drawn holds when absent, required for a file."
+        None, "Number of stitches; as many as the path as it is drawn, or its edges, hold when absent; else required."
     )
 
 
@@ -46,7 +46,7 @@ class TacksEntry(Entry):
     length_mm: Length = Field(description="Length of each tack.")
     pitch_mm: Length = Field(description="Distance from the begin of a tack to that of the next.")
     count: Count | None = setting(
-        None, "Number of tacks; as many as the path as it is drawn holds when absent, required for a file."
+        None, "Number of tacks; as many as the path as it is drawn, or its edges, hold when absent; else required."
     )
 
     @model_validator(mode="after")

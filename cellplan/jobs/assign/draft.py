@@ -9,11 +9,8 @@ from typing import Any
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.files.cell.changes import changed
-from cellplan.files.cell.expansion import expanded
 from cellplan.files.cell.load import CellFile, load_open_cell
 from cellplan.files.cell.open_tasks import open_tasks
-from cellplan.files.yaml.reader import read_yaml
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Mode, Robot, Timing
@@ -99,8 +96,8 @@ class AssignmentDraft:
 
     def with_robot(self, name: str) -> "AssignmentDraft":
         """The draft if a robot were available: its tasks are its alone, and open ones are open to it too."""
-        changes = self.cell.origin.source.changes if isinstance(self.cell.origin.source, CellFile) else {}
-        root = changed(expanded(read_yaml(self.file, file=str(self.file))), changes).root
+        source = self.cell.origin.source
+        root: Any = source.document_with(source.changes).root if isinstance(source, CellFile) else {}
         robot = {**root["robots"][name], "available": True}
         opened = open_tasks({**root, "robots": {**root["robots"], name: robot}})
         robots = {task: opened.get(task, (name,)) for task in self.robots}

@@ -139,3 +139,34 @@ def test_edge_of_a_part_that_comes_from_no_step_file_is_refused(folder: Path) ->
 
     with pytest.raises(InputError, match=r"tasks.weld.path.edge: expected a part from a STEP file \(part.step\)"):
         load_cell(file)
+
+
+@pytest.mark.parametrize(
+    ("path", "keys", "spans"),
+    [
+        ("edge: WEB-BASE-3", "stitch: {length_mm: 30, gap_mm: 20}", [(0, 30), (50, 80), (100, 130)]),
+        ("edge: WEB-BASE-3, from_mm: 20", "tacks: {length_mm: 10, pitch_mm: 60}", [(20, 30), (80, 90), (140, 150)]),
+        ("edges: [WEB-BASE-3, WEB-BASE-1]", "stitch: {length_mm: 60, gap_mm: 40}", [(0, 60), (100, 160)]),
+    ],
+)
+def test_as_many_stitches_and_tacks_are_made_as_edges_hold(
+    folder: Path, path: str, keys: str, spans: list[tuple[int, int]]
+) -> None:
+    text = CELL.replace("PATH", f"{path}, from: BASE, work_deg: 40") + "program: {}\n"
+    (folder / "cell.yaml").write_text(text.replace("    feed_mm_s", f"    {keys}\n    feed_mm_s"))
+    tasks = [task for task in load_cell(folder / "cell.yaml").tasks if task.name != "weld"]
+    stretches = [task.stretch for task in tasks if task.stretch is not None]
+
+    assert [(it.begin, it.end) for it in stretches] == pytest.approx(np.array(spans) / 1e3)
+
+
+def test_stitches_along_an_edge_that_is_not_in_the_file_are_refused_by_their_edge_alone(folder: Path) -> None:
+    text = CELL.replace("PATH", "edge: WEB-BASE-9").replace(
+        "    feed", "    stitch: {length_mm: 9, gap_mm: 9}\n    feed"
+    )
+    (folder / "cell.yaml").write_text(text)
+    with pytest.raises(InputError) as refused:
+        load_cell(folder / "cell.yaml")
+
+    assert str(refused.value).count("\n") == 0
+    assert "tasks.weld.path.edge: expected an edge or seam of the STEP file" in str(refused.value)

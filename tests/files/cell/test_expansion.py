@@ -3,8 +3,10 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from cellplan.errors import InputError
 from cellplan.files.cell.expansion import expanded
 from cellplan.files.cell.load import load_cell, load_open_cell
 from cellplan.files.cell.write import render_cell
@@ -168,7 +170,7 @@ def test_keys_that_make_no_tasks_are_refused(refuse: Refuse, keys: str, message:
 def test_file_with_other_values_has_the_parts_in_their_order(tmp_path: Path, load: Load, keys: str) -> None:
     load(seam(keys))
     text = (tmp_path / "c").read_text(encoding="utf-8")
-    root = expanded(read_yaml(tmp_path / "c", file="c")).root
+    root = expanded(read_yaml(tmp_path / "c", file="c"), lambda *_: None).root
     (tmp_path / "c").write_text(changed_text(text, root, head="best"), encoding="utf-8")
 
     assert [task.name for task in load_cell("c").tasks] == list(root["tasks"])
@@ -181,3 +183,44 @@ def test_tacks_that_are_not_made_are_named_once(refuse: Refuse) -> None:
     assert [line.split(": expected")[0] for line in refuse(seam(tacks, "{tacks_first: true}"))] == [
         "c:21: tasks.root.tacks.pitch_mm"
     ]
+
+
+@pytest.mark.parametrize(
+    ("values", "names"),
+    [
+        ({"tasks.root.skip": True}, ["cap"]),
+        ({"tasks.root.passes[1].work_deg": 30}, ["root_1", "root_2", "root_3", "cap"]),
+        ({"tasks.root.passes": None}, ["root", "cap"]),
+        (
+            {"tasks.cap.tacks": {"length_mm": 10, "pitch_mm": 95}},
+            ["root_1", "root_2", "root_3", "cap_t1", "cap_t2", "cap_t3", "cap"],
+        ),
+    ],
+)
+def test_values_of_an_entry_are_set_before_it_becomes_parts(
+    load: Load, values: dict[str, object], names: list[str]
+) -> None:
+    cell = load(seam(PASSES), (": {}\nprogram", ": {duration_s: 9}\nprogram")).with_values(values)
+
+    assert [task.name for task in cell.tasks][: len(names)] == names
+
+
+def test_values_of_an_entry_and_of_one_of_its_parts_hold_together(load: Load) -> None:
+    cell = (
+        load(seam(PASSES)).with_values({"tasks.root_3.path.work_deg": 35}).with_values({"tasks.root.path.push_deg": 20})
+    )
+    angles = {task.name: task.seam.angles for task in cell.tasks if task.seam is not None}
+
+    assert np.rad2deg([angles[f"root_{k}"].travel for k in (1, 2, 3)]) == pytest.approx([10.0, 20.0, 20.0])
+    assert np.rad2deg([angles[f"root_{k}"].work for k in (1, 2, 3)]) == pytest.approx([45.0, 50.0, 35.0])
+
+
+def test_skipped_entry_comes_back(load: Load) -> None:
+    skipped = load(seam(PASSES)).with_values({"tasks.root.skip": True})
+
+    assert len(skipped.with_values({"tasks.root.skip": False}).tasks) == 4
+
+
+def test_value_of_an_entry_that_is_wrong_is_named(load: Load) -> None:
+    with pytest.raises(InputError, match=r"with tasks\.root\.path\.from = roof: .*expected one of the walls"):
+        load(seam(PASSES)).with_values({"tasks.root.path.from": "roof"})
