@@ -11,7 +11,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.curves.seam_line import SeamLine
-from cellplan.geometry.step.joints import Place, joints
+from cellplan.geometry.step.joints import Place, joints, penetrating
 from cellplan.geometry.step.kernel import Solid
 from cellplan.geometry.step.lines import line_of_edge
 from cellplan.geometry.step.reader import read_solids
@@ -74,6 +74,7 @@ class StepDrawing:
     faces: tuple[StepFace, ...]
     parts: tuple[str, ...]  # names of the solids
     unused: tuple[str, ...]  # what else the file holds, with its count
+    penetrating: tuple[tuple[str, str], ...]  # names of solids that penetrate each other
 
     def edge(self, name: str) -> StepEdge | None:
         """The edge or seam of a name; None when there is none."""
@@ -109,7 +110,13 @@ def read_drawing(path: Path, file: str, shape: str | None, gap: float) -> StepDr
         ]
         edges += [_edge(solid, k, of_edges.pop(0), names, file) for k in range(len(solid.edges))]
     seams = _seams(solids, joints(solids, gap, file), [edge.name for edge in edges])
-    return StepDrawing(edges=(*edges, *seams), faces=tuple(faces), parts=tuple(used), unused=tuple(content.unused))
+    return StepDrawing(
+        edges=(*edges, *seams),
+        faces=tuple(faces),
+        parts=tuple(used),
+        unused=tuple(content.unused),
+        penetrating=tuple((used[a], used[b]) for a, b in penetrating(solids)),
+    )
 
 
 def _edge(solid: Solid, k: int, name: str, faces: Sequence[str], file: str) -> StepEdge:

@@ -8,6 +8,7 @@ solid covers it.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from cellplan.geometry.transforms import cross
 
 PROBE: Final = 5e-5  # [m] from a seam at which it is looked whether there is material
 TOUCH: Final = 1e-6  # [m] solids nearer than this touch
+DEEP: Final = 1e-5  # [m] solids that reach farther than this into each other penetrate each other
 STEP: Final = 5e-3  # [m] between places of an edge at which seams are looked for
 FEWEST: Final = 33  # such places
 SHORTEST: Final = 2e-3  # [m] of a seam
@@ -144,6 +146,13 @@ def joints(solids: Sequence[Solid], gap: float, source: str) -> list[Place]:
             if not any(_is_same(place, other, gap) for other in places):
                 places.append(place)
     return places
+
+
+def penetrating(solids: Sequence[Solid]) -> Iterator[tuple[int, int]]:
+    """Places of solids that penetrate each other: no seam is found where the edges of one are inside the other."""
+    for a, b in combinations(range(len(solids)), 2):
+        if _near(solids[a].box, solids[b].box, -DEEP - TOUCH) and solids[a].penetrates(solids[b], DEEP):
+            yield a, b
 
 
 def _between(

@@ -186,6 +186,14 @@ class Solid:
             is_near[index] = self._classifier.State() != TopAbs_OUT
         return is_near
 
+    def penetrates(self, other: "Solid", depth: float) -> bool:
+        """Whether both have more room in common than a layer of a depth in [m] along an axis of the file."""
+        from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
+        from OCP.TopAbs import TopAbs_SOLID
+
+        common = BRepAlgoAPI_Common(self.shape, other.shape).Shape()
+        return any(bool(np.all(np.subtract(*_box(it)[::-1]) > depth)) for it in explored(common, TopAbs_SOLID))
+
     @cached_property
     def corners(self) -> Array:
         """Points in [m] spread over all edges, their ends included, shape (N, 3)."""

@@ -16,6 +16,7 @@ from cellplan.report.record.common import number
 
 SCHEMA: Final = "cellplan.seams/1"
 FLUSH_DEG: Final = 0.0  # work angle of a seam whose walls lie in one plane
+NO_SEAM: Final = "no seam is listed where edges of one are inside the other; correct the drawing"
 MM2: Final = 1e6  # [mm^2/m^2]
 
 
@@ -72,6 +73,7 @@ def seams_record(listing: Listing, request: SeamsRequest) -> dict[str, Any]:
             for face in listing.drawing.faces
         ],
         "unused": list(listing.drawing.unused),
+        "penetrating": [list(pair) for pair in listing.drawing.penetrating],
         "tasks": task_lines(listing.edges),
     }
 
@@ -99,6 +101,7 @@ def seams_lines(listing: Listing, request: SeamsRequest) -> Iterator[str]:
     joints = [edge for edge in edges if edge.joint is not None]
     yield f"{request.path.name}: {_count(drawing.parts, 'solid')}, {_count(drawing.faces, 'face')}"
     yield from (f"  not used: {text}" for text in drawing.unused)
+    yield from (f"  {one} and {other} penetrate each other: {NO_SEAM}" for one, other in drawing.penetrating)
     width = max([len(edge.name) for edge in edges], default=0)
     for title, listed in (("seams", joints), ("edges", [edge for edge in edges if edge.joint is None])):
         if listed:

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.files.run.whole_file import replace_older
+from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.jobs.step_seams.listing import Listing, SeamsRequest, seams_record
 from cellplan.model.units import MM
 from cellplan.report.page.render import template
@@ -15,9 +16,6 @@ MARK: Final = "cellplan-seams-page"
 KIND: Final = "a page of seams"
 POINTS: Final = 65  # of a curve that is drawn
 FEWEST: Final = 2
-ARROW: Final = (
-    12.0  # [mm] length of the axis that is drawn at the middle of an edge: the tool halfway between its walls
-)
 
 
 def write_seams_page(listing: Listing, request: SeamsRequest, target: Path) -> int:
@@ -34,7 +32,7 @@ def seams_page(listing: Listing, request: SeamsRequest) -> str:
     mesh = listing.part.mesh
     data: dict[str, Any] = {
         "edges": [
-            {**values, "line": _line(edge.line.points), "out": _middle(edge)}
+            {**values, "line": _line(edge.line.points), **_middle(edge.line)}
             for values, edge in zip(record["edges"], listing.edges, strict=True)
         ],
         "vertices": np.round(MM * mesh.vertices, 3).ravel().tolist(),
@@ -50,13 +48,15 @@ def _line(points: np.ndarray[Any, Any]) -> list[float]:
     return np.round(MM * points[step], 3).ravel().tolist()
 
 
-def _middle(edge: Any) -> list[float]:
-    """Middle of an edge, and the end of an arrow from it halfway between its walls, in [mm]."""
-    k = (len(edge.line.points) - 1) // 2
-    middle = edge.line.points[k] if len(edge.line.points) > FEWEST else edge.line.points.mean(axis=0)
-    out = sum(normals[k] for normals in edge.line.walls.values())
-    out = out / max(float(np.linalg.norm(out)), 1e-9)
-    return np.round([*(MM * middle), *(MM * middle + ARROW * out)], 3).tolist()
+def _middle(line: SeamLine) -> dict[str, list[Any]]:
+    """Middle of a line in [mm], unit vector of travel there, and outward normals of its walls."""
+    k = (len(line.points) - 1) // 2
+    middle = line.points[k] if len(line.points) > FEWEST else line.points.mean(axis=0)
+    return {
+        "middle": np.round(MM * middle, 3).tolist(),
+        "travel": np.round(line.tangents[k], 6).tolist(),
+        "normals": [np.round(normals[k], 6).tolist() for normals in line.walls.values()],
+    }
 
 
 def _is_seams_page(path: Path) -> bool:

@@ -3,9 +3,10 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
-from builders.step_files import Named, box, write_step
+from builders.step_files import Named, box, cylinder, write_step
 
 from cellplan.cli.main import run
 
@@ -52,6 +53,44 @@ def test_page_names_every_edge_and_is_the_same_again(step_file: Path) -> None:
     assert text == Path("two.html").read_text()
     assert all(f"<td>{name}</td>" in text for name in ("E1", "TOP_1", "WEB-BASE-4"))
     assert "http" not in text  # nothing is loaded
+
+
+def test_page_has_the_directions_that_angles_are_drawn_in(step_file: Path) -> None:
+    assert run(["seams", str(step_file), "-o", "page.html"]) == 0
+    text = Path("page.html").read_text()
+    edges = json.loads(text.split("const part = ", 1)[1].split(";\n", 1)[0])["edges"]
+
+    for edge in edges:
+        travel, normals = np.array(edge["travel"]), np.array(edge["normals"])
+        assert np.abs(np.linalg.norm([travel, *normals], axis=1) - 1.0).max() <= 1e-5
+        assert np.abs(normals @ travel).max() <= 1e-5  # work angles are across the seam, travel angles along it
+        assert np.linalg.norm(np.array(edge["middle"]) - edge["from_mm"]) <= edge["length_mm"]
+
+
+@pytest.mark.parametrize(("depth_mm", "is_said"), [(-0.4, False), (0.0, False), (0.005, False), (0.5, True)])
+def test_solids_that_penetrate_each_other_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], depth_mm: float, is_said: bool
+) -> None:
+    low = 10.0 - depth_mm
+    parts = [
+        Named("BASE", box((0, 0, 0), (200, 100, 10))),
+        Named("WEB", box((20, 46, low), (180, 54, 60))),
+        Named("TUBE", cylinder(8, 30, (30, 20, 10))),
+    ]
+    write_step(tmp_path / "part.step", parts)
+
+    assert run(["seams", str(tmp_path / "part.step"), "--fillets", "--gap-mm", "1"]) == 0
+    assert ("BASE and WEB penetrate each other" in capsys.readouterr().out) == is_said
+
+
+def test_tube_through_a_plate_without_a_hole_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_step(
+        tmp_path / "p.step",
+        [Named("BASE", box((0, 0, 0), (90, 90, 10))), Named("TUBE", cylinder(8, 80, (45, 45, -30)))],
+    )
+
+    assert run(["seams", str(tmp_path / "p.step"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["penetrating"] == [["BASE", "TUBE"]]
 
 
 def test_other_files_are_refused_and_left_alone(step_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
