@@ -13,6 +13,7 @@ from cellplan.checks.clearance.tool_depth import check_depths, check_standoffs
 from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
 from cellplan.checks.joints.demanded_feeds import check_feeds
 from cellplan.checks.joints.drift import check_joint_drift, repeatability
+from cellplan.checks.joints.greatest_feeds import greatest_feeds
 from cellplan.checks.joints.limits import check_joints, check_shown, check_sums
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.joints.payload import check_payload, load_uses
@@ -131,6 +132,7 @@ def verify_motion(
         standoffs=tips,
         accelerations=accelerations,
         loads=loads,
+        greatest_feeds=greatest_feeds(scene, schedule, q, accuracy),
     )
 
 

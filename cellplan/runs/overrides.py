@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from cellplan.errors import InputError
 from cellplan.files.cell.changes import read_setting
 from cellplan.model.cell.cell import Cell
+from cellplan.model.task.task import ProgrammedPath
 
 if TYPE_CHECKING:
     from cellplan.model.cell.cell_errors import CellErrors
@@ -34,6 +35,20 @@ def with_overrides(cell: Cell, settings: Iterable[str] = (), **options: str | fl
     """
     values = read_settings(settings, {ADDRESSES[name]: value for name, value in options.items() if value is not None})
     return cell.with_values(values) if values else cell
+
+
+def feed_settings(cell: Cell, feed: str | None) -> tuple[str, ...]:
+    """Settings ``KEY=VALUE`` that give all processes with one feed another, such as ``greatest``; none for None.
+
+    Raises:
+        InputError: There is no such process.
+    """
+    if feed is None:
+        return ()
+    tasks = [task.name for task in cell.tasks if task.process is not None and not isinstance(task.path, ProgrammedPath)]
+    if not tasks:
+        raise InputError("--feed: expected a cell with a task that has a process, got none; write process: {feed_mm_s}")
+    return tuple(f"tasks.{name}.process.feed_mm_s={feed}" for name in tasks)
 
 
 def read_settings(settings: Iterable[str], others: Mapping[str, object] | None = None) -> dict[str, object]:

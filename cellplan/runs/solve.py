@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path, PurePath
 
 from cellplan.checks.clearance.phase_ends import JudgedPhase, with_phase_ends
@@ -21,6 +22,7 @@ from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths
 from cellplan.runs.early_clearance import EarlyClearance
+from cellplan.runs.greatest_feeds import OpenFeed, at_greatest_feeds, open_feeds
 from cellplan.runs.plan.given_starts import with_chosen_start, with_placed_starts
 from cellplan.runs.plan.headers import table_headers
 from cellplan.runs.plan.homes import depends_on_homes, find_homes, with_homes
@@ -70,6 +72,8 @@ def solve_motion(
         near: Folder of a run of which the branches are kept.
         early: Begins with the clearance of each phase as soon as its rows are known.
     """
+    if opened := open_feeds(cell, task):
+        return _at_greatest_feeds(cell, opened, task=task, near=near, progress=progress, early=early)
     refuse_clock_name(cell)
     branches = None if near is None else read_branches(near, cell)
     cell = with_run_named(cell, branches)
@@ -94,6 +98,24 @@ def solve_motion(
     motion, runs = _runs(solved, clock, nominal, [scene] * len(planned), early=early, progress=progress)
     runs = tuple(replace(run, moved=_of_phase((*moved, *more), run.phase)) for run in runs)
     return scene, Solution(cell=solved, motion=motion, runs=runs, remark=choice.warning)
+
+
+def _at_greatest_feeds(
+    cell: Cell,
+    opened: Sequence[OpenFeed],
+    *,
+    task: str | None,
+    near: Path | None,
+    progress: Progress,
+    early: EarlyClearance | None,
+) -> tuple[Scene, Solution]:
+    """The program at the greatest feeds; see ``solve_motion``."""
+    solved = partial(solve_motion, task=task, near=near, progress=progress)
+    scene, solution = at_greatest_feeds(cell, opened, solved, is_leximin=cell.motion.is_leximin, progress=progress)
+    for run in solution.runs:
+        if early is not None:
+            early.begin(run.scene, run.schedule, stacked_positions(run.cell, run.report.q))
+    return scene, solution
 
 
 def _of_phase(moved: Sequence[MovedStart], phase: Phase) -> tuple[MovedStart, ...]:

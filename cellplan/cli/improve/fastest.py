@@ -32,6 +32,7 @@ class FastestOptions(shared.JobOptions):
     mode: shared.Mode = None
     method: shared.Method = None
     settings: shared.Settings = ()
+    feed: shared.Feed = None
     task: shared.TaskName = None
     workers: Annotated[
         int | None,
@@ -76,11 +77,12 @@ def fastest(options: FastestOptions) -> Result:
     from cellplan.jobs.fastest.demand import read_demand
     from cellplan.jobs.fastest.result import fastest_lines, fastest_record, write_fastest
     from cellplan.jobs.fastest.shortest import fastest as shortest
-    from cellplan.runs.overrides import require_task, with_overrides
+    from cellplan.runs.overrides import feed_settings, require_task, with_overrides
 
     demand = None if options.demand is None else read_demand(options.demand)
     given = load_cell(options.cell, allow_dirs=options.allow_dirs)
-    cell = with_overrides(given, options.settings, mode=options.mode, method=options.method)
+    settings = (*options.settings, *feed_settings(given, options.feed))
+    cell = with_overrides(given, settings, mode=options.mode, method=options.method)
     require_task(cell, options.task)
     folder, workers = options.output, options.workers or processors()
     if folder is not None:

@@ -46,6 +46,10 @@ Settings = Annotated[
     tuple[str, ...],
     option("--set KEY=VALUE", "Set any value of the cell file, such as robots.kuka.base.x_mm=900; may be repeated."),
 ]
+Feed = Annotated[
+    str | None,
+    option("--feed FEED", "Feed of all tasks with a process: a number in mm/s, greatest, or a range such as [40, 90]."),
+]
 PlotFormats = Annotated[
     tuple[str, ...],
     option("--plots FORMAT", "Write the plots as png or pdf too; SVG is always written. May be repeated."),

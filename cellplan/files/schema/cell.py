@@ -177,6 +177,12 @@ class MotionEntry(Entry):
         "Time in which a joint without a stated limit of jerk is taken to build up its full acceleration in a retimed "
         "program; unlimited takes none.",
     )
+    greatest_feeds: Literal["common", "leximin"] = setting(
+        "common",
+        "Which feeds are the greatest where several tasks that are done together have feed_mm_s: greatest or a range: "
+        "common, all in their ratios (process.feed_ratio); leximin, each as great as the others leave it, the least "
+        "one first.",
+    )
     controller_cycle_ms: CycleTime = setting(Ms(4.0), "Cycle of the controllers, over which jerk is taken.")
     time_law: TimeLawChoice = setting("quintic", "Law of each stretch of path between stops.")
     corners: CornerChoice = setting("stop", "Stop at corners, or round them.")

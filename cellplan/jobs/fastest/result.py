@@ -24,6 +24,8 @@ from cellplan.report.plots.svg import inline_svg, svg_text
 from cellplan.report.record.common import Number, Record, as_json, number
 from cellplan.report.record.figures import LOAD, SHOWN, Figures, csv_text, page_cells, page_headings, terminal_table
 from cellplan.report.record.rows import by_name, columns_of, flat
+from cellplan.report.record.sections.tasks import greatest_feed_record
+from cellplan.report.text.run import feed_rows
 from cellplan.runs.write_run import versions, write_run
 
 SCHEMA: Final = "cellplan.fastest/1"
@@ -117,6 +119,9 @@ def _program(program: TimedProgram, written: float) -> dict[str, Any]:
             }
             for binding in program.bindings
         ],
+        "greatest_feeds": {
+            feed.task: greatest_feed_record(feed) for run in program.solution.runs for feed in run.report.greatest_feeds
+        },
         "figures": figures.record(LOAD),
         "status": "failed" if failed else "passed",
         "robots": _robots(figures),
@@ -229,6 +234,7 @@ def _program_lines(title: str, program: Record) -> Iterator[str]:
     """One program: its cycle, what binds, speeds, errors, clearance and failed checks."""
     yield f"  {title}: {program['cycle_s']:g} s, {100.0 * program['share_of_written']:.3g} % of the written time"
     yield from (f"    {line}" for line in _binding_lines(program))
+    yield from (f"    {label} {value}, {where}" for label, value, where in feed_rows(program["greatest_feeds"]))
     figures, clearance = program["figures"], program["smallest_clearance_mm"]
     distance = "nothing to keep clear of" if clearance is None else f"smallest clearance {clearance:.4g} mm"
     yield (

@@ -25,6 +25,8 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import REDUCED_SPEED
 from cellplan.model.units import MM
 from cellplan.report.record.figures import LOAD
+from cellplan.runs.greatest_feeds import OpenFeed, open_feeds, open_values, stated_values
+from cellplan.runs.solve import solve_motion
 from cellplan.study.run import outcomes
 from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
@@ -115,7 +117,8 @@ def fastest(
             the demand cannot be met.
     """
     refuse_fixed_times(cell)
-    base = cell.with_values({"motion.timing": "as_written"})
+    opened = open_feeds(cell, task)
+    base = _with_stated_feeds(cell, opened, task, progress).with_values({"motion.timing": "as_written"})
 
     def solved(law: Law, values: dict[str, object], title: str) -> TimedProgram:
         return TimedProgram.solved(base, law, values, task=task, progress=_within(progress, title))
@@ -129,7 +132,7 @@ def fastest(
         refuse_unless_possible(demand, min(laws, common, key=lambda program: program.cycle), cell.motion.step)
     laws = laws.certified(_within(progress, "time laws"))
     common = common.certified(_within(progress, "common speed"))
-    reduced, remark = _at_reduced_speed(common, solved, progress)
+    reduced, remark = _at_reduced_speed(common, open_values(opened), solved, progress)
     met = None
     if demand is not None:
         met = calmest(base, demand, written=written, laws=laws, common=common, solved=solved)
@@ -146,11 +149,22 @@ def fastest(
     )
 
 
-def _at_reduced_speed(common: TimedProgram, solved: SolvedAt, progress: Progress) -> tuple[TimedProgram | None, str]:
-    """The best common speed with all tools at reduced speed, or why there is none."""
+def _with_stated_feeds(cell: Cell, opened: Sequence[OpenFeed], task: str | None, progress: Progress) -> Cell:
+    """The cell with the greatest feeds, which also hold at the best common speed, in place of open ones."""
+    if not opened:
+        return cell
+    _, solution = solve_motion(cell.with_values({"motion.timing": "fastest"}), task=task, progress=progress)
+    stated = {feed.task.name: solution.cell.task(feed.task.name).feed or 0.0 for feed in opened}
+    return cell.with_values(stated_values(opened, stated))
+
+
+def _at_reduced_speed(
+    common: TimedProgram, feeds: Mapping[str, object], solved: SolvedAt, progress: Progress
+) -> tuple[TimedProgram | None, str]:
+    """The best common speed with all tools at reduced speed, feeds sought anew, or why there is none."""
     if max(speed.tool_peak for run in common.solution.runs for speed in run.report.speeds.values()) <= REDUCED_SPEED:
         return common, ""
-    values = {"motion.timing": "fastest", "checks.tool_speed_mm_s": MM * REDUCED_SPEED}
+    values = {"motion.timing": "fastest", "checks.tool_speed_mm_s": MM * REDUCED_SPEED, **feeds}
     try:
         program = solved(Law.REDUCED_SPEED, values, "reduced speed")
     except (InputError, NoSolutionError) as error:

@@ -2,20 +2,23 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
 
 from cellplan.errors import NoSolutionError, TooFewStepsError
-from cellplan.jobs.fastest.timed_program import NEAR, Binding, Law, SolvedAt, TimedProgram, scaled_values
+from cellplan.jobs.fastest.timed_program import NEAR, Law, SolvedAt, TimedProgram, scaled_values
 from cellplan.model.cell.cell import Cell
-from cellplan.model.task.task import ProgrammedPath, Task
+from cellplan.model.progress import silent
 from cellplan.model.units import MM
+from cellplan.runs.greatest_feeds import OpenFeed, at_greatest_feeds
+from cellplan.runs.solve import solve_motion
 
 MOST_SLOWER: Final = 8  # programs tried until one keeps every limit
 MOST_TRIALS: Final = 40  # programs tried in all: halving alone needs 21 among as many rows as a table may have
 SLOWED: Final = 4.0  # [-] times as long: by then hardly anything but the feeds of processes loads the joints
-DIGITS: Final = 4  # of the greatest feed that holds
+FEED_TOL: Final = 1e-4  # [-] of a feed: what is less holds it
 
 
 @dataclass(slots=True)
@@ -95,58 +98,26 @@ def from_both_sides(
 
 def _no_time_law(base: Cell, solved: SolvedAt) -> NoSolutionError:
     """Why no clock is slow enough: feeds of processes that joints cannot hold, else speeds that jump."""
-    values, reasons = scaled_values(base, SLOWED), list[str]()
-    slow = solved(Law.TIME_LAWS, values, "time laws")
-    left = [task for task in base.tasks if task.process is not None and not isinstance(task.path, ProgrammedPath)]
-    while slow.load > 1.0 and left:
-        worst = max(slow.bindings, key=lambda binding: binding.time_share)
-        left.sort(key=lambda task: task.robot != worst.robot)  # a positioner holds the feeds of all its operators
-        task = left.pop(0)
-        program = _at_greatest_feed(task, values, slow, worst.robot, solved)
-        if program is not None:
-            slow, values = program, dict(program.values)
-            reasons.append(_held(task, worst, float(str(values[_key(task)]))))
-    if reasons and slow.load <= 1.0:
-        return NoSolutionError("; ".join(reasons))
+    values = scaled_values(base, SLOWED)
+    opened = [
+        OpenFeed(task=task, lowest=0.0, highest=task.feed)
+        for task in base.tasks
+        if task.process is not None and task.has_one_feed and task.feed is not None
+    ]
+    if opened:
+        made = partial(solve_motion, task=None, progress=silent)
+        _, slow = at_greatest_feeds(base.with_values(values), opened, made, is_leximin=True, progress=silent)
+        answers = [answer for run in slow.runs for answer in run.report.greatest_feeds]
+        stated = {feed.task.name: feed for feed in opened}
+        reasons = [
+            stated[it.task].refusal(stated[it.task].highest, it)
+            for it in answers
+            if it.feed < stated[it.task].highest * (1.0 - FEED_TOL)
+        ]
+        held = {feed.key: MM * answer.feed for feed in opened for answer in answers if answer.task == feed.task.name}
+        if reasons and solved(Law.TIME_LAWS, values | held, "greatest feeds").load <= 1.0:
+            return NoSolutionError("; ".join(reasons))
     return NoSolutionError(
         f"{base.origin.at('motion.time_law')}: expected time laws that keep all limits when slow enough, got "
         "speeds that jump; use the time law quintic, or write acceleration: unlimited"
-    )
-
-
-def _key(task: Task) -> str:
-    """Address of the feed of a process."""
-    return f"tasks.{task.name}.process.feed_mm_s"
-
-
-def _at_greatest_feed(
-    task: Task, values: dict[str, object], program: TimedProgram, robot: str, solved: SolvedAt
-) -> TimedProgram | None:
-    """The program at the greatest feed of a task at which the joints of a robot keep their limits; None for none.
-
-    Args:
-        values: What else is set in the cell, by address.
-        program: The program at the feed as it is written, at which they do not.
-    """
-    feed = MM * (task.feed or 0.0)
-    unit = 10.0 ** (np.floor(np.log10(feed)) - DIGITS + 1)
-    highest, less, bracket, best = int(np.floor(feed / unit + NEAR)), 0, RootBracket(), None
-    for trial in range(MOST_TRIALS):
-        load = program.load_of(robot)
-        bracket.note(less, holds=load <= 1.0)
-        best = program if load <= 1.0 else best
-        less = bracket.following(highest - int((highest - less) / load), trial=trial)
-        if bracket.is_closed or less >= highest:
-            break
-        slower = {_key(task): float(f"{(highest - less) * unit:.{DIGITS}g}")}
-        program = solved(Law.TIME_LAWS, values | slower, "greatest feed")
-    return best
-
-
-def _held(task: Task, worst: Binding, greatest: float) -> str:
-    """Which feed a joint cannot hold, and the greatest that it does."""
-    return (
-        f"{task.where('process.feed_mm_s')}: expected at most {greatest:g} mm/s, the greatest feed at which "
-        f"{worst.robot} {worst.joint} keeps its {worst.kind} limit, got {MM * (task.feed or 0.0):g}, at which it is at "
-        f"{100.0 * worst.share:.4g} % of it however slow all else is"
     )

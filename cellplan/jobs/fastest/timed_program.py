@@ -9,6 +9,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
+from cellplan.measures.limit_shares import KINDS, ORDERS
 from cellplan.model.cell.cell import Cell, joint_at
 from cellplan.model.progress import Progress
 from cellplan.model.report.report import TaskAccuracy
@@ -23,8 +24,6 @@ from cellplan.scene.scene import Scene
 
 BINDS: Final = 0.99  # [-] share of a limit from which on it binds
 TASK_LIMITS: Final = ("feed", "tolerance between rows")
-KINDS: Final = ("velocity", "acceleration", "jerk")
-ORDERS: Final = (1.0, 0.5, 1.0 / 3.0)  # how the time that a limit asks for grows with its share
 NEAR: Final = 1e-9  # [-] of a number of steps: rounding
 
 

@@ -223,6 +223,7 @@ class MotionSettings:
     # is retimed; None for no limit
     build_up: float | None = 0.05
     grid: float | None = None  # grid of the controller in [s], on which all rows lie; None for rows of every step
+    is_leximin: bool = False  # whether greatest feeds of tasks that are done together are sought one after the other
     # step in [s] of a method that goes from row to row, as ``step_s`` says; None where it is that of the rows
     finer: float | None = None
 

@@ -11,6 +11,7 @@ from cellplan.model.motion.plan import Phase
 from cellplan.model.presented import Presented
 from cellplan.model.report.between_rows import BetweenRows
 from cellplan.model.report.check_kinds import CHECK_KINDS, CheckKind
+from cellplan.model.report.greatest_feed import GreatestFeed
 from cellplan.model.report.left_out import LeftOut
 from cellplan.model.report.skew import SkewReport
 from cellplan.model.report.stops import StopReport
@@ -291,6 +292,7 @@ class Report(Presented):
         phase: Name of the phase that it is for; None for the only one of a program.
         skew: How far the clocks of controllers may be apart; None for a cell that states no controllers.
         stops: What happens at worst when one robot stops; None where no controller states how its robots go on.
+        greatest_feeds: Greatest feed of each process that has one feed, and holds it.
     """
 
     cell: str
@@ -317,6 +319,7 @@ class Report(Presented):
     phase: str | None = None
     skew: SkewReport | None = None
     stops: StopReport | None = None
+    greatest_feeds: tuple[GreatestFeed, ...] = ()
 
     @property
     def passed(self) -> bool:

@@ -2,15 +2,18 @@
 
 from typing import Annotated, Final, Literal, Self
 
+import numpy as np
 from pydantic import AfterValidator, Field, Tag, model_validator
 
 from cellplan.model.settings.entry import Entry, SlidingSpeed, by_kind, rule, setting
-from cellplan.model.settings.units import Deg, Mm, Within
+from cellplan.model.settings.units import Deg, Mm, MmPerS, Within
 
 FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
 LONGEST_S: Final = 1e6  # [s] eleven days: longer is a wrong unit
 FREE_WORDS: Final = "spin or {tilt_deg: 10}"
 WIDEST_TILT_DEG: Final = 60.0  # beyond it a tool works with its side
+FEED_WORDS: Final = "a number above 0 in mm/s, greatest or [low, high]"
+UNKNOWN_FEED: Final = 0.01  # [m/s] of a process whose greatest feed is not known yet
 MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
 
@@ -112,13 +115,34 @@ class WeldPositionEntry(Entry):
         return self.rotation_deg[0].si, self.rotation_deg[1].si
 
 
+def _has_width(feeds: tuple[MmPerS, MmPerS]) -> tuple[MmPerS, MmPerS]:
+    """The smaller feed first."""
+    if feeds[0] >= feeds[1]:
+        raise rule(f"expected [low, high], got [{feeds[0]:g}, {feeds[1]:g}]: the smaller feed comes first")
+    return feeds
+
+
+FeedChoice = Annotated[
+    Annotated[Literal["greatest"], Tag(f"<{FEED_WORDS}>")]
+    | Annotated[SlidingSpeed, Tag("<number>")]
+    | Annotated[tuple[SlidingSpeed, SlidingSpeed], AfterValidator(_has_width), Tag("<list>")],
+    by_kind(FEED_WORDS, number=(int, float), list=tuple),
+]
+
+
 class ProcessEntry(Entry):
     """A process that demands a feed: welding, sealing, dispensing."""
 
-    feed_mm_s: SlidingSpeed | None = setting(
+    feed_mm_s: FeedChoice | None = setting(
         None,
-        "Demanded speed of the tool along its path on the surface, but for the ramps beside each stop; not for a path "
-        "whose file states the feeds.",
+        "Demanded speed of the tool along its path on the surface, but for the ramps beside each stop: a number, the "
+        "greatest that all limits allow, or the greatest within a range, [400, 900]. Not for a path whose file states "
+        "the feeds.",
+    )
+    feed_ratio: Annotated[float, Field(gt=0.0, le=1000.0)] = setting(
+        1.0,
+        "Ratio of the greatest feeds of tasks that are done together: one of 2 runs twice as fast as one of 1. Only "
+        "with greatest or a range.",
     )
     tolerance_percent: Annotated[float, Field(gt=0.0, le=50.0)] = setting(
         5.0, "By how much the speed between two rows may differ from the feed."
@@ -137,8 +161,27 @@ class ProcessEntry(Entry):
 
     @property
     def feed(self) -> float:
-        """Demanded speed in [m/s], the greatest one of a path with several."""
-        return 0.0 if self.feed_mm_s is None else self.feed_mm_s.si
+        """Demanded speed in [m/s], the greatest one of a path with several; a slow one while it is open."""
+        if isinstance(self.feed_mm_s, MmPerS):
+            return self.feed_mm_s.si
+        return 0.0 if self.feed_mm_s is None else self.open_feeds[0] or UNKNOWN_FEED
+
+    @property
+    def has_open_feed(self) -> bool:
+        """Whether the greatest feed is sought."""
+        return self.feed_mm_s is not None and not isinstance(self.feed_mm_s, MmPerS)
+
+    @property
+    def open_feeds(self) -> tuple[float, float]:
+        """The least and the greatest feed in [m/s] that may be found where it is open."""
+        return (self.feed_mm_s[0].si, self.feed_mm_s[1].si) if isinstance(self.feed_mm_s, tuple) else (0.0, np.inf)
+
+    @model_validator(mode="after")
+    def _has_its_ratio(self) -> Self:
+        """Only open feeds have a ratio."""
+        if self.feed_ratio != 1.0 and not self.has_open_feed:
+            raise rule("unexpected key, the feed is stated: write feed_mm_s: greatest, or leave it out", "feed_ratio")
+        return self
 
     @property
     def tolerance(self) -> float:

@@ -12,6 +12,7 @@ from cellplan.model.report.report import ClearanceClass, ClosureAccuracy, Condit
 from cellplan.model.task.task import Frame
 from cellplan.model.units import rounded_down
 from cellplan.report.plots.errors import ORIENTATION, POSITION, error_panels
+from cellplan.report.plots.feeds import feed_figure
 from cellplan.report.plots.figure import (
     Figure,
     Item,
@@ -47,8 +48,8 @@ Shares = Mapping[str, tuple[Sequence[JointUse], Array]]  # by robot: its joints 
 def run_figures(report: Report, *, cell: Cell) -> dict[str, Figure]:
     """All figures of one run by name, what decides about it first.
 
-    These are ``margins``, ``speeds``, ``clearance``, ``task_<task>``, ``closure_<robot>``, ``positions_<robot>`` and
-    ``velocities_<robot>``, and ``singularity``, as far as the run has what they show.
+    These are ``margins``, ``speeds``, ``clearance``, ``task_<task>``, ``feed_<task>``, ``closure_<robot>``,
+    ``positions_<robot>`` and ``velocities_<robot>``, and ``singularity``, as far as the run has what they show.
 
     Args:
         cell: Where tolerances, the required clearance and the order of the robots come from.
@@ -63,6 +64,8 @@ def run_figures(report: Report, *, cell: Cell) -> dict[str, Figure]:
     figures = {name: figure for name, figure in over_all.items() if figure is not None}
     for accuracy in report.accuracy:
         figures[f"task_{accuracy.task}"] = _task_figure(accuracy, report.times, cell)
+    for greatest in report.greatest_feeds:
+        figures[f"feed_{greatest.task}"] = feed_figure(greatest)
     for closure in report.closures:
         figures[f"closure_{closure.robot}"] = _closure_figure(closure, report.times, cell)
     for robot in robots:

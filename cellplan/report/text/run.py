@@ -17,6 +17,7 @@ from cellplan.report.text.columns import Row, aligned
 from cellplan.report.text.method import DEFAULT_METHOD, moved_start_lines, no_accurate_mode
 from cellplan.report.text.notes import accuracy_note, clock_note, grip_notes, open_surface_notes, skew_row
 
+NEAR_GREATEST: Final = 1.02  # [-] times a feed: a greatest one below is said
 MOST_OF_A_GROUP: Final = 8  # [-] failed checks that are shown; further ones are counted
 
 
@@ -79,6 +80,7 @@ def _rows(record: Record) -> Iterator[Row]:
     yield from _speed_rows(record["joints"])
     yield from acceleration_rows(record)
     yield from _task_rows(record["tasks"])
+    yield from feed_rows({name: task.get("greatest_feed") for name, task in record["tasks"].items()})
     yield from _closure_rows(record.get("closure", {}))
     yield from skew_row(record)
     yield from stop_rows(record)
@@ -108,6 +110,16 @@ def _task_rows(tasks: Record) -> Iterator[Row]:
                 f"{task['path_bulge_mm']:.3g} mm",
                 f"from the sides between its points, task {name}",
             )
+
+
+def feed_rows(feeds: Record) -> Iterator[Row]:
+    """What binds the feeds that are near the greatest ones, or beyond, by task."""
+    for name, feed in feeds.items():
+        if feed and feed["greatest_mm_s"] is not None and feed["greatest_mm_s"] < NEAR_GREATEST * feed["feed_mm_s"]:
+            ramp, point = " in a ramp" if feed["in_ramp"] else "", f" ({feed['point']})" if feed["point"] else ""
+            where = f"{feed['binding']}, {feed['limit']}{ramp}, at {small(feed['at_mm'])} mm{point}"
+            figure = f"{fixed(feed['greatest_mm_s'])} mm/s"
+            yield "greatest feed", figure, f"task {name} at {fixed(feed['feed_mm_s'])}: {where} {instant_text(feed)}"
 
 
 def _closure_rows(closures: Record) -> Iterator[Row]:

@@ -9,11 +9,10 @@ import numpy as np
 from cellplan.certify.point_speeds import point_speeds
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
-from cellplan.measures.accelerations import jerks, joint_accelerations, part_acceleration, point_accelerations
-from cellplan.measures.joint_use import joint_uses
+from cellplan.measures.accelerations import part_acceleration
+from cellplan.measures.limit_shares import rate_limits, row_loads
 from cellplan.measures.tool_errors import error_lengths, part_poses, relative_to_task_frame
 from cellplan.model.cell.cell import Cell, Relation, Timing
-from cellplan.model.cell.joint_limits import acceleration_limits, retimed_jerk_limit
 from cellplan.model.motion.joint_path import JointPath
 from cellplan.model.motion.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
@@ -191,11 +190,8 @@ def joint_path(motion: Motion) -> JointPath:
 
 def joint_bounds(cell: Cell) -> JointLimitsInTime:
     """Limits of all joints of a cell: stated ones, else those that the cell assumes."""
-    numbers = [(robot, index) for robot in cell.robots for index in range(len(robot.model.joints))]
-    jerk = [retimed_jerk_limit(cell, robot, index) or np.inf for robot, index in numbers]
-    return JointLimitsInTime(
-        velocity=cell.joint_limits.velocity, acceleration=acceleration_limits(cell), jerk=np.array(jerk)
-    )
+    velocity, acceleration, jerk = rate_limits(cell)
+    return JointLimitsInTime(velocity=velocity, acceleration=acceleration, jerk=jerk)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,18 +208,9 @@ class RowLimits:
 
     def shares(self, times: Array, q: Array) -> tuple[Array, Array, Array]:
         """Largest velocity, acceleration and jerk of each joint, in shares of the limits, shape (nq,) each."""
-        cell, loads = self.scene.cell, []
-        for robot in cell.robots:
-            positions, cycle = q[:, cell.columns(robot.name)], robot.controller_cycle
-            signed = point_accelerations(times, positions)[..., None]
-            loads.append(
-                (
-                    [use.peak_velocity for use in joint_uses(robot, times, positions)],
-                    joint_accelerations(times, positions, cycle=cycle).values.max(axis=0),
-                    jerks(times, signed, window=cycle).max(axis=0),
-                )
-            )
-        velocity, acceleration, jerk = (np.concatenate(ratios) for ratios in zip(*loads, strict=True))
+        cell = self.scene.cell
+        loads = [row_loads(robot, times, q[:, cell.columns(robot.name)]).max(axis=1) for robot in cell.robots]
+        velocity, acceleration, jerk = np.concatenate(loads, axis=1)
         return velocity / self.bounds.velocity, acceleration / self.bounds.acceleration, jerk / self.bounds.jerk
 
     def slower(self, sigma: Array, q: Array) -> float:

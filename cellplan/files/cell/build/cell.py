@@ -303,6 +303,7 @@ def build_motion(entry: MotionEntry) -> MotionSettings:
         duration=entry.duration_s,
         step=entry.row_step,
         grid=None if entry.grid_ms is None else entry.grid_ms.si,
+        is_leximin=entry.greatest_feeds == "leximin",
         finer=None if entry.row_step == entry.step_s else entry.step_s,
         cyclic=entry.cyclic,
         locked=entry.locked_joints,

@@ -5,8 +5,10 @@ from typing import Final
 
 from cellplan.files.cell.rules.solver_rules import accurate_findings, feedback_findings
 from cellplan.files.input.findings import Finding, KeyPath, unknown_name
+from cellplan.files.schema.cell import CycleEntry
 from cellplan.files.schema.partial import ValidEntries
 from cellplan.files.schema.path import CsvEntry
+from cellplan.files.schema.seam import OF_FEED
 from cellplan.files.schema.task import TaskEntry
 from cellplan.files.yaml.reader import YamlDocument
 from cellplan.geometry.curves.seam_line import SeamLine
@@ -47,6 +49,7 @@ def rule_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Findi
     yield from feedback_findings(valid, document)
     yield from accurate_findings(valid, document)
     yield from _timing(valid, document)
+    yield from _open_feeds(valid, document)
 
 
 def _clashing_names(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
@@ -164,6 +167,25 @@ def _timing(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     for name, task in valid.tasks.items():
         if task.settle_s > 0.0:
             yield document.finding(("tasks", name, "settle_s"), text.format(task.settle_s))
+
+
+def _open_feeds(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
+    """A feed that is sought decides how long the motion takes; nothing else does."""
+    motion = valid.motion
+    stated = {
+        "motion.duration_s": motion is not None and motion.duration_s is not None,
+        "motion.timing.cycle_s": motion is not None and isinstance(motion.timing, CycleEntry),
+    }
+    for name, task in valid.tasks.items():
+        if task.process is None or not task.process.has_open_feed:
+            continue
+        place: KeyPath = ("tasks", name, "process", "feed_mm_s")
+        for key in (key for key, is_stated in stated.items() if is_stated):
+            text = f"expected a number beside {key}, as a feed that is sought sets the clock; leave {key} out"
+            yield document.finding(place, text)
+        for key in (key for key in OF_FEED if task.path.weave is not None and getattr(task.path.weave, key)):
+            text = f"expected a number beside path.weave.{key}, whose length follows from the feed"
+            yield document.finding(place, text)
 
 
 def target_findings(valid: ValidEntries, targets: Targets, document: YamlDocument) -> Iterator[Finding]:

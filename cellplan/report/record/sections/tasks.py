@@ -8,6 +8,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.acceleration import ProcessSpeed
 from cellplan.model.cell.cell import Cell
+from cellplan.model.report.greatest_feed import GreatestFeed
 from cellplan.model.report.report import Report, Standoff, TaskAccuracy, ToolDepth
 from cellplan.model.task.path_direction import run_direction
 from cellplan.model.task.task import Task
@@ -99,8 +100,34 @@ class TiltRecord(TypedDict, total=False):
     allowed_tilt_deg: Annotated[Number, "half angle of the cone within which it may lean"]
 
 
+class GreatestFeedRecord(TypedDict):
+    """The greatest constant feed along the same joint path, and what binds where it is least."""
+
+    feed_mm_s: Annotated[Number, "feed at which the path is run along"]
+    greatest_mm_s: Annotated[Number, "greatest feed at which all limits hold, by what scales with time"]
+    binding: Annotated[str, "robot and joint that binds, the robot whose tool does, or the task"]
+    limit: Annotated[str, "`velocity`, `acceleration`, `jerk`, `tool speed` or `tolerance between rows`"]
+    at_mm: Annotated[Number, "place on the path, from its start"]
+    at_s: Annotated[Number, "its time"]
+    point: Annotated[str, "point of the file that is nearest, with its line; empty for a path without a file"]
+    in_ramp: Annotated[bool, "whether the tool speeds up or slows down there"]
+
+
+class GreatestRecord(TypedDict, total=False):
+    """Only of a task with one feed that is held."""
+
+    greatest_feed: Annotated[GreatestFeedRecord, "greatest constant feed, and what binds"]
+
+
 class TaskRecord(
-    BetweenRowsRecord, DepthRecord, StandoffRecord, DirectionRecord, RapidsRecord, TiltRecord, PhaseOfTask
+    BetweenRowsRecord,
+    DepthRecord,
+    StandoffRecord,
+    DirectionRecord,
+    RapidsRecord,
+    TiltRecord,
+    GreatestRecord,
+    PhaseOfTask,
 ):
     """Tool error of a task, desired minus actual, over the components that the task constrains."""
 
@@ -177,6 +204,7 @@ def _task_record(
         "end_s": number(accuracy.end_s),
         **_rapids_record(accuracy),
         **_tilt_record(accuracy, task),
+        **_greatest_record(report, task),
         **_phase_of(report),
         **direction_record(task),
         **between_record(accuracy.between),
@@ -190,6 +218,26 @@ def _rapids_record(accuracy: TaskAccuracy) -> RapidsRecord:
     """When the process of a task is off along its path; nothing where it is on throughout."""
     off = [[number(begin), number(end)] for begin, end in accuracy.process_off]
     return {"process_off_s": off} if off else {}
+
+
+def _greatest_record(report: Report, task: Task) -> GreatestRecord:
+    """The greatest feed of a task; nothing where it has none."""
+    greatest = next((feed for feed in report.greatest_feeds if feed.task == task.name), None)
+    return {} if greatest is None else {"greatest_feed": greatest_feed_record(greatest)}
+
+
+def greatest_feed_record(greatest: GreatestFeed) -> GreatestFeedRecord:
+    """The greatest feed of a task in printed units."""
+    return {
+        "feed_mm_s": number(greatest.feed, MM),
+        "greatest_mm_s": number(greatest.greatest, MM),
+        "binding": greatest.binding,
+        "limit": greatest.kind,
+        "at_mm": number(greatest.at, MM),
+        "at_s": number(greatest.at_s),
+        "point": greatest.point,
+        "in_ramp": greatest.is_in_ramp,
+    }
 
 
 def _tilt_record(accuracy: TaskAccuracy, task: Task) -> TiltRecord:

@@ -1,0 +1,163 @@
+"""The greatest feeds: what holds while a little more does not, what binds where, and how several tasks share them."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders.three_feeds import THREE_FEEDS, approached
+
+from cellplan import Cell, Solution, load_cell, solve
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.model.progress import silent
+from cellplan.model.report.greatest_feed import GreatestFeed
+from cellplan.runs.solve import solve_motion
+
+WRITTEN = {"motion.timing": "as_written"}
+
+
+def cell_of(folder: Path, text: str, **feeds: object) -> Cell:
+    file = folder / "cell.yaml"
+    file.write_text(text, encoding="utf-8")
+    return load_cell(file).with_values(WRITTEN | {f"tasks.{task}.process.feed_mm_s": it for task, it in feeds.items()})
+
+
+def planned(cell: Cell) -> Solution:
+    return solve_motion(cell, task=None, progress=silent)[1]
+
+
+def answers(solution: Solution) -> dict[str, GreatestFeed]:
+    return {feed.task: feed for run in solution.runs for feed in run.report.greatest_feeds}
+
+
+def feeds_of(solution: Solution) -> dict[str, float]:
+    return {task.name: task.process.feed_mm_s for task in solution.cell.tasks}
+
+
+def failed(solution: Solution) -> set[str]:
+    return {check.name for run in solution.runs for check in run.report.checks if not check.passed}
+
+
+@pytest.fixture(scope="module")
+def common(tmp_path_factory: pytest.TempPathFactory) -> Solution:
+    folder = tmp_path_factory.mktemp("common")
+    return planned(cell_of(folder, THREE_FEEDS, bead="greatest", seam="greatest", ring="greatest"))
+
+
+@pytest.mark.slow
+def test_the_greatest_feed_holds_and_a_little_more_does_not(tmp_path: Path, common: Solution) -> None:
+    more = cell_of(tmp_path, THREE_FEEDS, **{task: 1.003 * feed for task, feed in feeds_of(common).items()})
+
+    assert "joint_acceleration_assumed" not in failed(common)
+    assert "joint_acceleration_assumed" in failed(planned(more))
+
+
+@pytest.mark.slow
+def test_one_feed_for_all_and_what_binds_it_is_named_with_its_place(common: Solution) -> None:
+    assert len(set(feeds_of(common).values())) == 1
+    ring = answers(common)["ring"]
+    assert ring.greatest == pytest.approx(ring.feed, rel=2e-3)
+    assert (ring.binding, ring.kind, ring.is_in_ramp) == ("top B", "acceleration", False)
+    assert ring.at == pytest.approx(0.75 * 2.0 * np.pi * 0.03, rel=0.01)  # where the arm is stretched
+    assert re.fullmatch(r"joint top B, acceleration, at 14\d(\.\d)? mm", ring.text)
+
+
+@pytest.mark.slow
+def test_the_resolved_cell_states_the_feeds_and_gives_the_same_tables(tmp_path: Path, common: Solution) -> None:
+    again = planned(cell_of(tmp_path, THREE_FEEDS, **feeds_of(common)))
+
+    assert again.program.tables == common.program.tables
+
+
+def test_the_curve_scales_with_the_feed_it_was_run_along_at(tmp_path: Path) -> None:
+    """Between the ramps: at half the feed the same joints move along the same path."""
+    text = approached()
+    curves = [
+        answers(planned(cell_of(tmp_path, text, ring=feed).with_values({"motion.step_s": 0.4 / feed})))["ring"]
+        for feed in (60, 30)
+    ]
+    inside = np.linspace(0.01, 0.17, 200)
+
+    fast, slow = (np.interp(inside, curve.travelled, curve.feeds) for curve in curves)
+
+    assert np.allclose(fast, slow, rtol=0.02)  # differences over rows 0.4 mm and 0.2 mm apart
+
+
+@pytest.mark.slow
+def test_feeds_keep_their_ratios(tmp_path: Path) -> None:
+    text = THREE_FEEDS.replace("process: {feed_mm_s: 50,", "process: {feed_mm_s: greatest, feed_ratio: 2,")
+
+    feeds = feeds_of(planned(cell_of(tmp_path, text, ring="greatest")))
+
+    assert feeds["seam"] == pytest.approx(2.0 * feeds["ring"], rel=1e-5)
+    assert feeds["bead"] == 40.0
+
+
+@pytest.mark.slow
+def test_leximin_lets_the_others_rise_beyond_the_one_that_binds(tmp_path: Path, common: Solution) -> None:
+    text = THREE_FEEDS.replace("timing: fastest", "greatest_feeds: leximin")
+
+    feeds = feeds_of(planned(cell_of(tmp_path, text, bead=[10, 80], seam="greatest", ring="greatest")))
+
+    assert feeds["ring"] == pytest.approx(feeds_of(common)["ring"], rel=1e-2)
+    assert feeds["bead"] == pytest.approx(80.0, rel=6e-3)
+    assert feeds["seam"] > 81.0
+
+
+@pytest.mark.slow
+def test_the_greatest_feed_holds_in_the_rows_of_a_retimed_program_too(tmp_path: Path) -> None:
+    cell = cell_of(tmp_path, THREE_FEEDS, ring="greatest").with_values({"motion.timing": "fastest"})
+
+    solution = solve(cell)
+
+    assert solution.passed
+    assert answers(solution)["ring"].greatest >= answers(solution)["ring"].feed
+
+
+@pytest.mark.slow
+def test_a_range_without_a_feed_that_holds_is_refused_with_what_binds(tmp_path: Path) -> None:
+    with pytest.raises(NoSolutionError) as caught:
+        planned(cell_of(tmp_path, THREE_FEEDS, ring=[55, 90]))
+
+    match = re.fullmatch(
+        r".*tasks\.ring\.process\.feed_mm_s: feed 55 mm/s cannot be held: joint top B, acceleration, at 14\S+ mm; "
+        r"the greatest is (\S+) mm/s",
+        str(caught.value),
+    )
+    assert match, str(caught.value)
+    assert 30.0 < float(match[1]) < 50.0
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (
+            {"tasks.ring.process.feed_mm_s": "greatest", "motion.duration_s": 9},
+            "tasks.ring.process.feed_mm_s: expected a number beside motion.duration_s, as a feed that is sought sets "
+            "the clock; leave motion.duration_s out",
+        ),
+        (
+            {"tasks.ring.process.feed_mm_s": [10, 90], "motion.timing": {"cycle_s": 9}},
+            "tasks.ring.process.feed_mm_s: expected a number beside motion.timing.cycle_s, as a feed that is sought "
+            "sets the clock; leave motion.timing.cycle_s out",
+        ),
+        (
+            {"tasks.ring.process.feed_mm_s": [90, 10]},
+            "tasks.ring.process.feed_mm_s: expected [low, high], got [90, 10]: the smaller feed comes first",
+        ),
+        (
+            {"tasks.ring.process.feed_mm_s": "fastest"},
+            "tasks.ring.process.feed_mm_s: expected a number above 0 in mm/s, greatest or [low, high], got 'fastest'",
+        ),
+        (
+            {"tasks.ring.process.feed_ratio": 2},
+            "tasks.ring.process.feed_ratio: unexpected key, the feed is stated: write feed_mm_s: greatest, or leave "
+            "it out",
+        ),
+    ],
+)
+def test_what_contradicts_an_open_feed_is_refused(tmp_path: Path, values: dict[str, object], message: str) -> None:
+    cell = cell_of(tmp_path, THREE_FEEDS)
+
+    with pytest.raises(InputError, match=re.escape(message)):
+        cell.with_values(values)
