@@ -110,13 +110,12 @@ def verify_motion(
     arcs, welds = check_arcs(cell, schedule, scene.chains, q), check_weld_positions(schedule, scene.chains, q, X_WP)
     checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
     checks += [*check_payload(loads), *welds, *arcs, *check_seam_distances(cell, schedule, scene.chains, q, X_WP)]
-    checks += check_transfer_speeds(scene, schedule, uses, q) if moving else []
     return Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
         tasks=tuple(at_work),
         idle=tuple(idle),
-        checks=tuple(checks),
+        checks=(*checks, *(check_transfer_speeds(scene, schedule, uses, q) if moving else ())),
         accuracy=accuracy,
         joints=tuple(uses),
         clearance=UNKNOWN,

@@ -43,7 +43,7 @@ class OpenFeed:
 
     task: Task
     lowest: float  # the least one in [m/s] that will do
-    highest: float  # the greatest one in [m/s] that is wanted
+    highest: float  # the greatest one in [m/s] that is sought
     ratio: float = 1.0  # to the feeds of the tasks that are done together with it
 
     @classmethod

@@ -247,7 +247,7 @@ def test_all_findings_come_at_once_in_the_order_of_the_file(refuse: Refuse) -> N
         "c:13: part.geometry.cylinder.radius_mm: expected a positive number of millimetres, got -250",
         "c:18: tasks.ring.robot: expected a robot of this cell (holder, worker), got 'wroker', did you mean 'worker'?",
         "c:21: motion.duratoin_s: unknown key, did you mean 'duration_s'?; allowed: mode, duration_s, step_s, grid_ms, "
-        "timing, jerk_build_up_s, controller_cycle_ms, time_law, corners, cyclic, locked_joints",
+        "timing, jerk_build_up_s, greatest_feeds, controller_cycle_ms, time_law, corners, cyclic, locked_joints",
     ]
 
 
