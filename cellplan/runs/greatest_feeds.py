@@ -112,7 +112,7 @@ class _Group:
         self.level = 0.5 * (self.holds + most) if self.is_halved else guess
 
     def _yields(self, factors: Mapping[str, float]) -> bool:
-        """Whether feeds that rise no more were lowered a little, to be tried again: rows change with those of others."""
+        """Whether feeds that rise no more were lowered a little, to be tried again: rows change with others."""
         slower = {name: _rounded(feed * factors[name] * (1.0 - NEAR)) for name, feed in self.feeds.items()}
         slower = {name: feed for name, feed in slower.items() if self.least[name] <= feed and factors[name] < 1.0}
         self.feeds |= slower

@@ -121,8 +121,8 @@ def test_the_digest_of_the_file_stays_that_of_the_file(cell: Cell) -> None:
             {"motion.duraton_s": 1},
             [
                 "c with motion.duraton_s = 1: motion.duraton_s: unknown key, did you mean 'duration_s'?; allowed: "
-                "mode, duration_s, step_s, grid_ms, timing, jerk_build_up_s, greatest_feeds, controller_cycle_ms, time_law, corners, "
-                "cyclic, locked_joints"
+                "mode, duration_s, step_s, grid_ms, timing, jerk_build_up_s, greatest_feeds, controller_cycle_ms, "
+                "time_law, corners, cyclic, locked_joints"
             ],
         ),
         (
