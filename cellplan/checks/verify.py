@@ -94,8 +94,7 @@ def verify_motion(
     The report does not say yet whether the run passed: ``with_clearance`` completes it.
     """
     cell, q = scene.cell, _positions(scene.cell, schedule, tables)
-    at_work = [scheduled.task.name for scheduled in schedule.tasks]
-    idle = [name for name in idle_robots(cell, at_work) if name not in moving] if idle is None else idle
+    idle = [name for name in idle_robots(cell, schedule.names) if name not in moving] if idle is None else idle
     progress("checking tool errors and joints", 0.0)
     X_WP = part_poses(cell, scene.chains, q)
     accuracy, closures = _errors(scene, schedule, q, X_WP)
@@ -110,16 +109,19 @@ def verify_motion(
     arcs, welds = check_arcs(cell, schedule, scene.chains, q), check_weld_positions(schedule, scene.chains, q, X_WP)
     checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
     checks += [*check_payload(loads), *welds, *arcs, *check_seam_distances(cell, schedule, scene.chains, q, X_WP)]
+    checks += check_transfer_speeds(scene, schedule, uses, q) if moving else []
     return Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
-        tasks=tuple(at_work),
+        tasks=schedule.names,
         idle=tuple(idle),
-        checks=(*checks, *(check_transfer_speeds(scene, schedule, uses, q) if moving else ())),
+        checks=tuple(checks),
         accuracy=accuracy,
         joints=tuple(uses),
         clearance=UNKNOWN,
-        conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving) if at_work else None,
+        conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving)
+        if schedule.tasks
+        else None,
         motion_share=_motion_share(uses),
         speeds=speeds,
         times=schedule.times,

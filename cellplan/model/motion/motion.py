@@ -102,6 +102,11 @@ class Schedule:
         """Time between two samples in [s]."""
         return float(self.times[-1] / (len(self.times) - 1))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the tasks."""
+        return tuple(scheduled.task.name for scheduled in self.tasks)
+
     def woven(self, task: Task) -> ClockedPath | None:
         """The path of a task whose tool weaves about it; None of one that does not, or whose weave is not known."""
         paths = (path for path in self.paths if path.task.name == task.name)
