@@ -137,6 +137,11 @@ def verify_motion(
     )
 
 
+def _idle(cell: Cell, schedule: Schedule, moving: Sequence[str]) -> list[str]:
+    """Names of the robots without a task that may not move either."""
+    return [name for name in idle_robots(cell, schedule.names) if name not in moving]
+
+
 def with_clearance(
     report: Report, scene: Scene, schedule: Schedule, *, is_reported: bool = True, progress: Progress = silent
 ) -> Report:
