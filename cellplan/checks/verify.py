@@ -93,8 +93,8 @@ def verify_motion(
 
     The report does not say yet whether the run passed: ``with_clearance`` completes it.
     """
-    cell, q = scene.cell, _positions(scene.cell, schedule, tables)
-    idle = [name for name in idle_robots(cell, schedule.names) if name not in moving] if idle is None else idle
+    cell, q, at_work = scene.cell, _positions(scene.cell, schedule, tables), schedule.names
+    idle = [name for name in idle_robots(cell, at_work) if name not in moving] if idle is None else idle
     progress("checking tool errors and joints", 0.0)
     X_WP = part_poses(cell, scene.chains, q)
     accuracy, closures = _errors(scene, schedule, q, X_WP)
@@ -113,15 +113,13 @@ def verify_motion(
     return Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
-        tasks=schedule.names,
+        tasks=at_work,
         idle=tuple(idle),
         checks=tuple(checks),
         accuracy=accuracy,
         joints=tuple(uses),
         clearance=UNKNOWN,
-        conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving)
-        if schedule.tasks
-        else None,
+        conditioning=conditioning(cell, schedule, scene.chains, q=q, X_WP=X_WP, moving=moving) if at_work else None,
         motion_share=_motion_share(uses),
         speeds=speeds,
         times=schedule.times,
@@ -135,11 +133,6 @@ def verify_motion(
         loads=loads,
         greatest_feeds=greatest_feeds(scene, schedule, q, accuracy),
     )
-
-
-def _idle(cell: Cell, schedule: Schedule, moving: Sequence[str]) -> list[str]:
-    """Names of the robots without a task that may not move either."""
-    return [name for name in idle_robots(cell, schedule.names) if name not in moving]
 
 
 def with_clearance(
