@@ -32,8 +32,8 @@ def tool_zones(robot: Robot, q: Array, shares: Array) -> Array:
     """
     zones = np.zeros(len(q))
     if len(q) > 2:
-        inner, share = q[1:-1], shares[1:-1, None]
-        zones[1:-1] = np.min([_away(robot, inner, other, share) for other in (q[:-2], q[2:])], axis=0)
+        inner, share, tips = q[1:-1], shares[1:-1], tool_tips(robot, q[1:-1])
+        zones[1:-1] = np.min([_away(robot, tips, inner, other, share) for other in (q[:-2], q[2:])], axis=0)
     return zones
 
 
@@ -57,12 +57,13 @@ def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
     shares = np.zeros(len(q))
     rows = np.flatnonzero(zones > 0.0)
     rows = rows[(rows > 0) & (rows < len(q) - 1)]
+    tips = tool_tips(robot, q[rows])
     for other in (rows - 1, rows + 1):
         low, high = np.zeros(len(rows)), np.full(len(rows), LARGEST_SHARE)
-        inside = _away(robot, q[rows], q[other], high[:, None]) <= zones[rows]
+        inside = _away(robot, tips, q[rows], q[other], high) <= zones[rows]
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            near = _away(robot, q[rows], q[other], middle[:, None]) <= zones[rows]
+            near = _away(robot, tips, q[rows], q[other], middle) <= zones[rows]
             low, high = np.where(near, middle, low), np.where(near, high, middle)
         shares[rows] = np.maximum(shares[rows], np.where(inside, LARGEST_SHARE, high))
     return shares
@@ -124,9 +125,9 @@ def shares_off_seams(moves: Sequence[Move], rows: RobotRows) -> Array:
     return shares
 
 
-def _away(robot: Robot, q: Array, other: Array, share: Array) -> Array:
-    """Distance of the tool from where it is in some rows, a share on the way to others, in [m], shape (N,)."""
-    away: Array = np.linalg.norm(tool_tips(robot, q + share * (other - q)) - tool_tips(robot, q), axis=1)
+def _away(robot: Robot, tips: Array, q: Array, other: Array, share: Array) -> Array:
+    """Distance of the tool from its tips in some rows, a share on the way to others, in [m], shape (N,)."""
+    away: Array = np.linalg.norm(tool_tips(robot, q + share[:, None] * (other - q)) - tips, axis=1)
     return away
 
 
