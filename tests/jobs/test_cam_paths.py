@@ -1,6 +1,7 @@
 """Paths of CAM from the file to programs: feeds and rapids in rows, checks, reports and exports."""
 
 import json
+import re
 import time
 from pathlib import Path
 
@@ -81,7 +82,7 @@ def test_the_cell_of_the_run_solves_to_the_same_tables(folder: Path) -> None:
     assert again.program.tables["arm"].splitlines()[-100:] == written[-100:]
 
 
-def test_programs_of_rows_hold_the_process_and_lines_are_refused_with_the_cure(folder: Path) -> None:
+def test_programs_of_rows_hold_the_process(folder: Path) -> None:
     status, _, err = run_command("cellplan export run --format json --cell cell.yaml -o rows", folder)
     assert status == 0, err
     (arm,) = json.loads((folder / "rows/program.json").read_text())["robots"]
@@ -89,10 +90,47 @@ def test_programs_of_rows_hold_the_process_and_lines_are_refused_with_the_cure(f
     assert np.count_nonzero(np.diff(flags) == 1) == 1  # on again behind the rapids
     assert 0.3 < flags.mean() < 0.9
 
-    status, _, err = run_command("cellplan export run --format krl --moves linear --cell cell.yaml -o lines", folder)
-    assert status == 1
-    assert "task 'mill': its file states several feeds or rapids, which lines do not hold; write --format csv" in err
-    assert not (folder / "lines").exists()
+
+# two feeds on one straight cut, between which the tool does not stop, and a rapid to another cut
+TWO_FEEDS = f"""{GCODE_HEAD}S8000 M3
+G0 X-10 Y0 Z200.5
+G1 X0 F1800
+G1 X10 F900
+G0 Z220
+G0 Y10
+G0 Z200.5
+G1 X-10 F1200
+G0 Z250
+M30
+"""
+
+
+@pytest.mark.slow
+def test_each_feed_is_a_line_of_its_own_speed_and_rapids_are_out_of_process(folder: Path, tmp_path: Path) -> None:
+    cell = (folder / "cell.yaml").read_text().replace("    off_part:", "    approach_mm: 20\n    off_part:")
+    for name, text in {"cuts.nc": TWO_FEEDS, "cell.yaml": cell}.items():
+        (tmp_path / name).write_text(text)
+    for command in (
+        "cellplan solve cell.yaml -o run",
+        "cellplan export run --format krl --moves linear --cell cell.yaml -o lines",
+    ):
+        status, out, err = run_command(command, tmp_path)
+        assert status == 0, f"{out}\n{err}"
+    program, points = ((tmp_path / "lines" / f"arm.{suffix}").read_text() for suffix in ("src", "dat"))
+    at = {name: float(x) for name, x in re.findall(r"E6POS (\w+)=\{X ([-.\d]+)", points)}
+
+    state: dict[str, float] = {"on": 0.0, "feed": 0.0, "x": -10.0}
+    cuts, rapids = [], []
+    for line in program.splitlines():
+        if match := re.search(r"\$OUT\[5\]=(TRUE|FALSE)", line):
+            state["on"] = float(match[1] == "TRUE")
+        elif match := re.match(r"\s*\$VEL\.CP=([.\d]+)", line):
+            state["feed"] = 1e3 * float(match[1])
+        elif match := re.match(r"\s*S?LIN (\w+)", line):
+            (cuts if state["on"] else rapids).append((round(state["x"]), round(at[match[1]]), state["feed"]))
+            state["x"] = at[match[1]]
+    assert cuts == [(-10, 0, 30.0), (0, 10, 15.0), (10, -10, 20.0)]
+    assert max(feed for _, _, feed in rapids) == pytest.approx(100.0, abs=0.2)
 
 
 @pytest.mark.parametrize(

@@ -290,6 +290,19 @@ def demanded_spans(path: ClockedPath) -> tuple[DemandedSpan, ...]:
     return tuple(span for span in spans if span.end - span.begin > TIME_TOLERANCE)
 
 
+def stated_feeds(path: ClockedPath, times: Array) -> Array:
+    """Feeds in [m/s] that the file of a path states between times in [s], shape (N,), with ramps; NaN elsewhere.
+
+    That is in rapids and rests, and where a stretch is too short for its feed; shape (N - 1,).
+    """
+    middle = 0.5 * (times[:-1] + times[1:])
+    if path.pace is None:
+        return np.full(len(middle), np.nan)
+    stretch = np.clip(np.searchsorted(path.corners, middle, side="right") - 1, 0, len(path.pace.tops) - 1)
+    on_path = (middle >= path.start) & (middle <= path.end) & path.pace.is_at_feed[stretch]
+    return np.where(on_path, path.pace.tops[stretch], np.nan)
+
+
 def stops_of(path: ClockedPath) -> Array:
     """Times in [s] at which a tool stands on its path, at the ends of its stretches, shape (n,)."""
     return path.corners if path.pace is None else path.corners[np.append(path.pace.drops[:, 0] == 1.0, True)]

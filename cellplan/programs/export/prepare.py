@@ -149,10 +149,6 @@ def _with_lines(
         if (robot := frame.cell.task(task).robot) in frame.robots and holder not in in_step(frame, robot):
             by_joints[task] = f"'{holder}' moves the part while the tool works"
     for entry in frame.cell.tasks:
-        if entry.robot in frame.robots and not entry.has_one_feed:
-            by_joints[entry.name] = (
-                "its file states several feeds or rapids, which lines do not hold; write --format csv"
-            )
         if entry.robot in frame.robots and entry.weave is not None and entry.weave.stands:
             by_joints[entry.name] = "it stands at the edges of its weave, which lines do not hold; write --format csv"
     if frame.moves is Moves.LINEAR and by_joints:

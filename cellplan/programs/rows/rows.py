@@ -11,7 +11,7 @@ from cellplan.model.motion.motion import JointTable, Piece
 from cellplan.model.motion.plan import Interval, Plan
 from cellplan.model.report.exported import ProgramRows, RobotRows
 from cellplan.model.report.verified_run import VerifiedRun
-from cellplan.model.task.clocked_path import are_within
+from cellplan.model.task.clocked_path import are_within, stated_feeds
 from cellplan.model.task.task import TIME_TOLERANCE
 from cellplan.programs.elements.timed_rows import are_near
 from cellplan.programs.rows.interpolant import resting, row_velocities
@@ -32,7 +32,10 @@ class WorkRows(NamedTuple):
     rows: slice  # the rows, both ends included
     cell: Cell  # the cell as it is in the phase
     tasks: tuple[str, ...]  # names of the tasks that are worked on
-    corners: Mapping[str, tuple[int, ...]]  # by task, the rows nearest to where its tool stops between the ends
+    # by task, the rows nearest to where its tool stops between the ends, or its file states another feed
+    corners: Mapping[str, tuple[int, ...]]
+    # by task whose file states feeds, that of each step in [m/s], NaN in rapids, rests and where it is not reached
+    feeds: Mapping[str, Array]
 
 
 class EssentialRows(NamedTuple):
@@ -88,12 +91,15 @@ def _programs(run: VerifiedRun) -> Iterator[NominalRows]:
 def _work(run: VerifiedRun, piece: Piece) -> Iterator[WorkRows]:
     """The phases of a program, those of all cycles."""
     sigma = run.motion.sigma[piece.rows]
-    for place, _, rows in piece.phases:
+    for place, phase, rows in piece.phases:
         motion = run.motions[place % len(run.motions)]
         tasks = tuple(scheduled.task.name for scheduled in motion.schedule.tasks)
+        paced = {path.task.name: path for path in motion.schedule.paths if path.pace is not None}
         stops = {task: np.array(run.motion.plan.stops.get(task, ())) for task in tasks}
+        stops |= {task: phase.begin + np.unique(path.corners) for task, path in paced.items()}
         corners = {task: _corner_rows(sigma, rows, times) for task, times in stops.items()}
-        yield WorkRows(rows, motion.cell, tasks, corners)
+        feeds = {task: stated_feeds(path, sigma[rows] - phase.begin) for task, path in paced.items()}
+        yield WorkRows(rows, motion.cell, tasks, corners, feeds)
 
 
 def _corner_rows(sigma: Array, rows: slice, stops: Array) -> tuple[int, ...]:

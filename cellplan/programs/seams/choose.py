@@ -63,6 +63,7 @@ class ToolPath:
     # move in step
     held: Array | None = None
     smallest_zone: float = 0.0  # distance from a corner in process in [m] within which it cannot be rounded by number
+    feeds: Array | None = None  # of each step in [m/s], shape (N - 1,), see ``WorkRows``; None with one feed for all
 
     def pieces(self, ends: Sequence[int]) -> Iterator[Piece]:
         """The longest lines and arcs, one after the other, which end at some rows, increasing."""
@@ -335,6 +336,7 @@ def _path(
         if name != task.robot
     ]
     path = ToolPath(task=task, X_PT=X_PT, most=limits.most, least=least, held=np.hstack(held) if held else None)
+    path = replace(path, feeds=phase.feeds.get(task.name))
     return path if process is None else replace(path, smallest_zone=limits.smallest_zone)
 
 
@@ -359,14 +361,15 @@ def _piece_ends(path: ToolPath, rows: RobotRows, both: tuple[int, int], corners:
 
 
 def _feed(path: ToolPath, rows: RobotRows, between: tuple[int, int, int]) -> float:
-    """Speed of a tool in [m/s] between two rows of a phase: what its task states, or the greatest of the run.
+    """Speed of a tool in [m/s] between two rows of a phase: that of its task or its file, or the greatest of the run.
 
     A tool that weaves along its rows has the mean of the run in process, so that it travels at the feed of its task.
     """
     start, first, last = between
     is_on = path.task.feed is not None and rows.process is not None and bool(rows.process[start + first])
-    if is_on and path.task.feed is not None and path.task.weave is None:
-        return path.task.feed
+    stated = path.task.feed if path.feeds is None else float(path.feeds[(first + last) // 2])
+    if is_on and stated is not None and np.isfinite(stated) and path.task.weave is None:
+        return stated
     steps = np.linalg.norm(np.diff(path.X_PT[first : last + 1, :3, 3], axis=0), axis=1)
     times = np.diff(times_of(rows)[start + first : start + last + 1])
     if is_on and path.task.weave is not None:

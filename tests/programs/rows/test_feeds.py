@@ -30,7 +30,7 @@ def said(*speeds: np.ndarray, feeds: tuple[float | None, ...]) -> list[str]:
     cell = replace(cell, tasks=tasks)
     robots = {task.robot: rows_at(task.robot, speed) for task, speed in zip(tasks, speeds, strict=True)}
     program = ProgramRows(name=None, robots=robots)
-    work = WorkRows(slice(1, STEPS + 2), cell, tuple(task.name for task in tasks), {})
+    work = WorkRows(slice(1, STEPS + 2), cell, tuple(task.name for task in tasks), {}, {})
     return list(feeds_in_step([program], [program], [EssentialRows((), (work,))]))
 
 

@@ -23,7 +23,7 @@ OFF_TOL = 1e-5  # [m] by which a tool may leave its tolerance between two rows o
 
 def _work(cell: Cell, program: ProgramRows) -> EssentialRows:
     count = len(next(iter(program.robots.values())))
-    return EssentialRows((), (WorkRows(slice(0, count), cell, tuple(task.name for task in cell.tasks), {}),))
+    return EssentialRows((), (WorkRows(slice(0, count), cell, tuple(task.name for task in cell.tasks), {}, {}),))
 
 
 def _tool_errors(cell: Cell, one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> np.ndarray:

@@ -42,8 +42,9 @@ def tp_events(frame: ExportFrame, robot: str) -> Events:
 
 
 def speed_is_held(events: Events, task: str, *, in_process: bool) -> bool:
-    """Whether the data of the process hold the speed of a motion."""
-    return in_process and events.form is not None and events.form.feed_in(task) is not None
+    """Whether the data of the process hold the speed of a motion; they have one, not several feeds of a file."""
+    has_data = events.form is not None and events.form.feed_in(task) is not None
+    return in_process and has_data and events.frame.cell.task(task).has_one_feed
 
 
 class SeamRows(NamedTuple):
