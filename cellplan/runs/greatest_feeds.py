@@ -226,20 +226,33 @@ def at_greatest_feeds(
 
 def _groups(cell: Cell, opened: Sequence[OpenFeed], trials: _Trials, *, is_leximin: bool) -> list[_Group]:
     """Tasks that are done together, from the first program that can be planned."""
+    together = _first(cell, opened, is_leximin=is_leximin)
+    refused: InputError | None = None
+    for _ in range(MOST_SLOWER):
+        try:
+            solution = trials.at(together.tried, timing=Timing.AS_WRITTEN)[1]
+            break
+        except InputError as error:
+            refused, together.level = refused or error, SLOWER * together.level
+    else:
+        raise refused or InputError("greatest feeds: no path can be run along")
+    of_runs = [[feed for feed in opened if feed.task.name in run.phase.tasks] for run in solution.runs]
+    return [replace(together, rising=rising, feeds={}) for rising in of_runs if rising]
+
+
+def _first(cell: Cell, opened: Sequence[OpenFeed], *, is_leximin: bool = False) -> _Group:
+    """Feeds at which the longest path takes some seconds, of all tasks together."""
     lengths = [feed.task.repeat * build_toolpath(feed.task, cell.part).length for feed in opened]
     level = max(length / feed.ratio for length, feed in zip(lengths, opened, strict=True)) / SECONDS
     together = _Group(rising=list(opened), feeds={}, level=level, is_leximin=is_leximin)
     together.level = min(level, together.highest)
-    for slower in range(MOST_SLOWER + 1):
-        try:
-            solution = trials.at(together.tried, timing=Timing.AS_WRITTEN)[1]
-            break
-        except InputError:
-            if slower == MOST_SLOWER:
-                raise
-            together.level *= SLOWER
-    of_runs = [[feed for feed in opened if feed.task.name in run.phase.tasks] for run in solution.runs]
-    return [replace(together, rising=rising, feeds={}) for rising in of_runs if rising]
+    return together
+
+
+def with_first_feeds(cell: Cell) -> Cell:
+    """The cell with feeds in place of open ones at which the longest path takes some seconds."""
+    opened = open_feeds(cell)
+    return cell.with_values(stated_values(opened, _first(cell, opened).tried)) if opened else cell
 
 
 def _feeds(groups: Sequence[_Group]) -> dict[str, float]:

@@ -161,3 +161,26 @@ def test_what_contradicts_an_open_feed_is_refused(tmp_path: Path, values: dict[s
 
     with pytest.raises(InputError, match=re.escape(message)):
         cell.with_values(values)
+
+
+def test_with_ramps_of_a_length_all_motion_scales_with_the_feed(tmp_path: Path) -> None:
+    text = approached().replace("process: {feed_mm_s: 60}", "process: {feed_mm_s: 60, ramp_mm: 20}")
+    cells = (cell_of(tmp_path, text, ring=feed) for feed in (30, 60))
+    steps = ({"motion.step_s": s, "motion.controller_cycle_ms": 1000.0 * s} for s in (0.01, 0.005))
+    slow, fast = (planned(cell.with_values(values)) for cell, values in zip(cells, steps, strict=True))
+
+    ends = [next(run.report.accuracy[2].end_s - 0.5 for run in one.runs) for one in (slow, fast)]
+
+    assert ends[0] == pytest.approx(2.0 * ends[1])
+    inside = np.linspace(0.01, 0.17, 200)  # away from the approach, which keeps its time
+    curves = [np.interp(inside, answers(one)["ring"].travelled, answers(one)["ring"].feeds) for one in (slow, fast)]
+    assert np.allclose(*curves, rtol=1e-5)
+
+
+def test_either_a_time_or_a_length_of_ramps(tmp_path: Path) -> None:
+    cell = cell_of(tmp_path, THREE_FEEDS)
+
+    with pytest.raises(InputError, match=r"process\.ramp_mm: expected either ramp_s or ramp_mm, got both"):
+        cell.with_values({"tasks.ring.process.ramp_s": 0.1, "tasks.ring.process.ramp_mm": 5})
+    with pytest.raises(InputError, match=r"process\.ramp_mm: expected ramps that leave the feed of 60 mm/s some of"):
+        planned(cell.with_values({"tasks.ring.process.ramp_mm": 95}))

@@ -54,6 +54,7 @@ class LayoutOptions(shared.JobOptions):
         tuple[str, ...], option("--fix KEY", "What may not change, such as kuka.base.z_mm; may be repeated.")
     ] = ()
     settings: shared.Settings = ()
+    feed: shared.Feed = None
     attempts: Annotated[
         tuple[Path, ...],
         option("--try CELL2", "A cell file whose layout is tried too; may be repeated.", autocompletion=cell_files),

@@ -25,6 +25,7 @@ from cellplan.jobs.layout.search import layout_workers, refuse_search, search_la
 from cellplan.jobs.repair.record import SCHEMA
 from cellplan.jobs.repair.repair import repair
 from cellplan.jobs.repair.result import advice_lines, write_repair
+from cellplan.runs.overrides import feed_settings
 from cellplan.search.programs.objective import CycleTiming, Objective
 from cellplan.study.session import Stop
 
@@ -50,6 +51,9 @@ REPAIRED: Final = {
 
 def layout_request(options: SearchOptions, *, objective: str, **others: Any) -> LayoutRequest:
     """What is searched for, as the options say."""
+    if options.feed is not None:
+        cell = load_cell(options.cell, allow_dirs=options.allow_dirs)
+        others["settings"] = (*others.get("settings", options.settings), *feed_settings(cell, options.feed))
     return options.to(
         LayoutRequest,
         objective=_word("--objective", objective, Objective),

@@ -1,6 +1,6 @@
 """A program at a cycle time of its own: how near its joints come to their limits, and what binds it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final, Self
@@ -17,6 +17,7 @@ from cellplan.model.task.task import Task, TimedPath
 from cellplan.model.units import MM
 from cellplan.report.record.figures import Figures, figures_of
 from cellplan.runs.early_clearance import EarlyClearance
+from cellplan.runs.greatest_feeds import OpenFeed, stated_values
 from cellplan.runs.plan.retiming import RowLimits, row_limits
 from cellplan.runs.solution import Run, Solution
 from cellplan.runs.solve import certified, solve_motion
@@ -179,8 +180,12 @@ def _share_between(errors: TaskAccuracy, cell: Cell) -> float:
     return max(errors.between.position.largest / position, errors.between.orientation.largest / orientation)
 
 
-def scaled_values(cell: Cell, factor: float) -> dict[str, object]:
-    """Values of the cell file by address with which everything takes ``factor`` times as long."""
+def scaled_values(cell: Cell, factor: float, opened: Sequence[OpenFeed] = ()) -> dict[str, object]:
+    """Values of the cell file by address with which everything takes ``factor`` times as long.
+
+    Args:
+        opened: Processes whose feeds are sought: they are scaled too.
+    """
     motion = cell.motion
     values: dict[str, object] = {}
     if motion.duration is not None:
@@ -190,7 +195,8 @@ def scaled_values(cell: Cell, factor: float) -> dict[str, object]:
             values[f"motion.locked_joints[{index}].from_s"] = lock.from_s * factor
     for task in cell.tasks:
         values |= {f"tasks.{task.name}.{key}": value for key, value in _scaled_task(task, factor).items()}
-    return values
+    feeds = {feed.task.name: (cell.task(feed.task.name).feed or 0.0) / factor for feed in opened}
+    return values | stated_values(opened, feeds)
 
 
 def refuse_fixed_times(cell: Cell) -> None:

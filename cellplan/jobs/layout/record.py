@@ -182,12 +182,25 @@ def layout_record(
         "choices": _choices(ready, finished, tried),
         "dropped": _dropped(finished.trials),
         "misplacement": None,
-        "remarks": [*ready.variables.remarks, *_slowed(best), *no_gain(best.cycle if best else None, given.record)],
+        "remarks": [
+            *ready.variables.remarks,
+            *_feeds(ready, best),
+            *_slowed(best),
+            *no_gain(best.cycle if best else None, given.record),
+        ],
         "drawing": _drawing(ready, given, best) if best else {},
         "files": [],
         "inputs": dict(cell.inputs),
         "versions": versions(),
     }
+
+
+def _feeds(ready: PreparedSearch, best: CandidateResult | None) -> Iterator[str]:
+    """The feeds that were sought, with what binds them."""
+    runs = () if best is None or best.program is None else best.program.solution.runs
+    sought = {feed.task.name for feed in ready.opened}
+    for feed in (feed for run in runs for feed in run.report.greatest_feeds if feed.task in sought):
+        yield f"task {feed.task}: greatest feed {MM * feed.feed:.6g} mm/s; {feed.text}"
 
 
 def _slowed(best: CandidateResult | None) -> Iterator[str]:

@@ -13,6 +13,7 @@ LONGEST_S: Final = 1e6  # [s] eleven days: longer is a wrong unit
 FREE_WORDS: Final = "spin or {tilt_deg: 10}"
 WIDEST_TILT_DEG: Final = 60.0  # beyond it a tool works with its side
 FEED_WORDS: Final = "a number above 0 in mm/s, greatest or [low, high]"
+USUAL_RAMP: Final = 0.1  # [s]
 UNKNOWN_FEED: Final = 0.01  # [m/s] of a process whose greatest feed is not known yet
 MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
 
@@ -153,10 +154,13 @@ class ProcessEntry(Entry):
     off_delay_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = setting(
         0.0, "Time for which the tool rests at the end of its path with the process on."
     )
-    ramp_s: Annotated[float, Field(gt=0.0, le=10.0)] = setting(
-        0.1,
+    ramp_s: Annotated[float, Field(gt=0.0, le=10.0)] | None = setting(
+        None,
         "Time in which the tool comes from rest to the feed and back, at both ends of the path and at corners at "
-        "which it stops; the process is on, the feed is not judged.",
+        "which it stops; the process is on, the feed is not judged. 0.1 without ramp_mm.",
+    )
+    ramp_mm: Annotated[Mm, Within(gt=0.0, le=10_000.0)] | None = setting(
+        None, "Length of path on which it does, in place of ramp_s: all motion then scales with the feed."
     )
 
     @property
@@ -176,9 +180,20 @@ class ProcessEntry(Entry):
         """The least and the greatest feed in [m/s] that may be found where it is open."""
         return (self.feed_mm_s[0].si, self.feed_mm_s[1].si) if isinstance(self.feed_mm_s, tuple) else (0.0, np.inf)
 
+    @property
+    def ramp(self) -> float:
+        """Time of a ramp in [s]: on its length the mean speed is half the feed."""
+        if self.ramp_mm is not None:
+            return 2.0 * self.ramp_mm.si / self.feed
+        return USUAL_RAMP if self.ramp_s is None else self.ramp_s
+
     @model_validator(mode="after")
-    def _has_its_ratio(self) -> Self:
-        """Only open feeds have a ratio."""
+    def _agrees(self) -> Self:
+        """Only open feeds have a ratio; a ramp has a time or a length, and a length needs a feed."""
+        if self.ramp_mm is not None and self.ramp_s is not None:
+            raise rule("expected either ramp_s or ramp_mm, got both", "ramp_mm")
+        if self.ramp_mm is not None and self.feed_mm_s is None:
+            raise rule("unexpected key for a path whose file states the feeds; write ramp_s", "ramp_mm")
         if self.feed_ratio != 1.0 and not self.has_open_feed:
             raise rule("unexpected key, the feed is stated: write feed_mm_s: greatest, or leave it out", "feed_ratio")
         return self

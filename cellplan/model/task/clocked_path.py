@@ -280,7 +280,7 @@ def demanded_spans(path: ClockedPath) -> tuple[DemandedSpan, ...]:
     task, corners, pace = path.task, path.corners, path.pace
     if task.process is None:
         return ()
-    ramp = task.process.ramp_s
+    ramp = task.process.ramp
     if pace is None:
         spans = [DemandedSpan(begin + ramp, end - ramp, task.process.feed) for begin, end in pairwise(corners.tolist())]
     else:
@@ -313,4 +313,4 @@ def ramp_shares(path: ClockedPath) -> Array:
     task, duration = path.task, np.diff(path.corners)
     if path.pace is not None:
         return path.pace.ramps
-    return np.full(len(duration), task.time_law.ramp) if task.process is None else task.process.ramp_s / duration
+    return np.full(len(duration), task.time_law.ramp) if task.process is None else task.process.ramp / duration

@@ -273,14 +273,17 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
 
 def _at_feed(task: Task, process: ProcessEntry, behind: Array) -> Array:
     """Times in [s] of the stops of a path with a demanded feed: a ramp takes half of its time for its length."""
-    lengths, least = np.diff(behind), process.feed * process.ramp_s
+    lengths, least = np.diff(behind), process.feed * process.ramp
     if lengths.min() < least:
+        key, most = "ramp_s", f"{lengths.min() / process.feed:.3g} s"
+        if process.ramp_mm is not None:
+            key, most = "ramp_mm", f"{MM * lengths.min() / 2.0:.4g} mm"
         raise InputError(
-            f"{task.where('process.ramp_s')}: expected ramps that leave the feed of {process.feed_mm_s:g} mm/s some of "
-            f"each side, got {process.ramp_s:g} s for one of {MM * lengths.min():.4g} mm; round the corners "
-            f"(corners: {{blend_mm: 5}}) or make it shorter than {lengths.min() / process.feed:.3g} s"
+            f"{task.where(f'process.{key}')}: expected ramps that leave the feed of {MM * process.feed:g} mm/s some "
+            f"of each side, got {process.ramp:g} s for one of {MM * lengths.min():.4g} mm; round the corners "
+            f"(corners: {{blend_mm: 5}}) or make it shorter than {most}"
         )
-    return task.moves_from + np.append(0.0, np.cumsum(lengths / process.feed + process.ramp_s))
+    return task.moves_from + np.append(0.0, np.cumsum(lengths / process.feed + process.ramp))
 
 
 def _stops(task: Task, toolpath: Toolpath) -> Array:

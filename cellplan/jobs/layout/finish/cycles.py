@@ -1,6 +1,6 @@
 """The cycle of a layout: as the nodes have it, as short as the verified motion allows, and what that misses of both."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress
 from cellplan.model.report.report import ClearanceClass
 from cellplan.runs.early_clearance import EarlyClearance
+from cellplan.runs.greatest_feeds import OpenFeed, open_values
 from cellplan.runs.plan.retiming import row_limits
 from cellplan.runs.solution import Run
 from cellplan.search.programs.objective import CycleTiming, Objective
@@ -51,11 +52,17 @@ def draft(
         return TimedProgram.solved(cell, law, values, task=None, progress=progress, early=early)
     if not is_cycle:
         return TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=progress, early=early)
-    return scaled(cell, whole_steps(cell, cycle / ready.duration), progress)
+    return scaled(cell, whole_steps(cell, cycle / ready.duration), progress, ready.opened)
 
 
 def shortest(ready: PreparedSearch, cell: Cell, program: TimedProgram, progress: Progress) -> TimedProgram:
-    """The program in the shortest cycle that its limits allow, from that in another cycle; see ``draft``."""
+    """The program in the shortest cycle that its limits allow, from that in another cycle; see ``draft``.
+
+    Where feeds are sought it is that at the greatest ones.
+    """
+    if ready.opened:
+        values = open_values(ready.opened)
+        return TimedProgram.solved(cell, Law.TIME_LAWS, values, task=None, progress=progress)
     step = cell.motion.step
 
     def at(steps: int) -> TimedProgram:
@@ -69,9 +76,10 @@ def shortest(ready: PreparedSearch, cell: Cell, program: TimedProgram, progress:
     return program if best is None else best
 
 
-def scaled(cell: Cell, factor: float, progress: Progress) -> TimedProgram:
-    """The program slower or faster by a factor, verified but for its clearance."""
-    return TimedProgram.solved(cell, Law.TIME_LAWS, scaled_values(cell, factor), task=None, progress=progress)
+def scaled(cell: Cell, factor: float, progress: Progress, opened: Sequence[OpenFeed] = ()) -> TimedProgram:
+    """The program slower or faster by a factor, with the feeds that are sought, verified but for its clearance."""
+    values = scaled_values(cell, factor, opened)
+    return TimedProgram.solved(cell, Law.TIME_LAWS, values, task=None, progress=progress)
 
 
 def load_of(program: TimedProgram) -> float:

@@ -22,6 +22,7 @@ from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
+from cellplan.runs.greatest_feeds import OpenFeed, open_feeds, with_first_feeds
 from cellplan.runs.plan.sequence import plan_work
 from cellplan.runs.plan.start import chosen_start
 from cellplan.scene.scene import Scene
@@ -60,6 +61,7 @@ class PreparedSearch:
     moving: tuple[str, ...]  # names of the robots that move
     unled: "PreparedSearch | None" = None  # the same without the joint path; None where no path varies
     solved_start: Array | None = None  # start of the given layout that a solve finds, shape (nq,); or None
+    opened: tuple[OpenFeed, ...] = ()  # feeds that are sought; the cell states others
     phases: ProgramPhases | None = (
         None  # of a program from home to home; ``schedule`` and ``moving`` are its first block's
     )
@@ -69,6 +71,7 @@ class PreparedSearch:
         """Make a cell ready."""
         if cell.program.is_home_to_home:
             return _of_program(request, cell)
+        opened, cell = open_feeds(cell), with_first_feeds(cell)
         unled = without_path(cell)
         variables = Variables.of(cell, without=() if unled is None else resolving(cell))
         scene = Scene.from_cell(variables.base)
@@ -83,6 +86,7 @@ class PreparedSearch:
             schedule=schedule_paths(variables.base, [paths[name] for name in phase.tasks]),
             moving=tuple(phase.moving),
             unled=None if unled is None else cls.of(request, unled),
+            opened=tuple(opened),
         )
         needs_start = any(
             variable.kind is VariableKind.START and variable.given is None for variable in variables.tied.ranges

@@ -12,6 +12,7 @@ from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.cell.layout import ChoiceKind, VariableKind
 from cellplan.model.units import DEG, MM
+from cellplan.runs.greatest_feeds import open_feeds
 from cellplan.runs.overrides import with_overrides
 from cellplan.search.programs.objective import CycleTiming, Objective
 from cellplan.search.synchronous import refuse_other_jobs, refuse_other_methods
@@ -48,6 +49,7 @@ def searched_cell(request: LayoutRequest) -> Cell:
         _refuse_open_tasks(changed, purpose="--free path" if request.free else "layout.vary: a joint path")
     _refuse_margins(changed)
     _refuse_misplacement(request, changed)
+    _refuse_open_feeds(request, changed)
     return changed
 
 
@@ -87,6 +89,24 @@ def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:
         raise InputError(f"{key}: expected a motion by the time laws, got --timing retimed: leave one of them out")
     if cell.layout.paths or any(robot.path is not None for robot in cell.robots):
         raise InputError(f"{key}: expected no joint path of a positioner (robots.ROBOT.path): leave one of them out")
+
+
+def _refuse_open_feeds(request: LayoutRequest, cell: Cell) -> None:
+    """Refuse feeds that are sought where not all motion scales with them."""
+    layout = cell.layout
+    for feed in open_feeds(cell):
+        where, process = feed.task.where("process.feed_mm_s"), feed.task.process
+        if request.objective is not Objective.CYCLE:
+            raise InputError(f"{where}: expected a number beside --objective {request.objective}, got a feed to seek")
+        if request.timing is CycleTiming.RETIMED:
+            raise InputError(f"{where}: expected a number beside --timing retimed, got a feed to seek")
+        if layout is not None and layout.misplacement is not None:
+            raise InputError(f"{where}: expected a number where bases are misplaced, got a feed to seek")
+        if process is not None and process.ramp_mm is None and not cell.program.is_home_to_home:
+            raise InputError(
+                f"{feed.task.where('process.ramp_s')}: expected ramp_mm where the greatest feed is sought over a "
+                "layout, as all motion must scale with the feed; write process: {ramp_mm: 20}, with a length of yours"
+            )
 
 
 def _refuse_open_tasks(cell: Cell, *, purpose: str) -> None:
