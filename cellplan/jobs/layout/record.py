@@ -182,17 +182,20 @@ def layout_record(
         "choices": _choices(ready, finished, tried),
         "dropped": _dropped(finished.trials),
         "misplacement": None,
-        "remarks": [
-            *ready.variables.remarks,
-            *_feeds(ready, best),
-            *_slowed(best),
-            *no_gain(best.cycle if best else None, given.record),
-        ],
+        "remarks": [*_remarks(ready, best, given.record)],
         "drawing": _drawing(ready, given, best) if best else {},
         "files": [],
         "inputs": dict(cell.inputs),
         "versions": versions(),
     }
+
+
+def _remarks(ready: PreparedSearch, best: CandidateResult | None, given: GivenRecord) -> Iterator[str]:
+    """What has to be known of the best layout beside its figures."""
+    yield from ready.variables.remarks
+    yield from _feeds(ready, best)
+    yield from _slowed(best)
+    yield from no_gain(best.cycle if best else None, given)
 
 
 def _feeds(ready: PreparedSearch, best: CandidateResult | None) -> Iterator[str]:
