@@ -3,12 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from cellplan.errors import InputError, NoSolutionError
+from cellplan.errors import InputError, NoSolutionError, raise_findings, refusals
 from cellplan.files.cell.load import load_cell, with_names
 from cellplan.files.run.stored import read_stored_run
 from cellplan.files.run.whole_file import refuse_foreign, replace_older
@@ -21,7 +22,7 @@ from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.exported import Station
 from cellplan.programs.elements.conventions import Convention, convention_of
-from cellplan.programs.elements.frames import controller_base, on_flange
+from cellplan.programs.elements.frames import controller_base, on_flange, require_frame_numbers
 from cellplan.programs.elements.joints import Axes
 from cellplan.programs.promises.stations import stations
 from cellplan.report.floor_plan.dxf import MARK, floor_plan_dxf, require_dxf
@@ -142,7 +143,9 @@ def _of_run(request: FloorPlanRequest) -> FloorPlan:
     cell = load_stored_cell(
         stored, cell=request.cell, allow_dirs=request.allow_dirs, controllers=request.controllers
     ).cell
-    pendants = pendant_frames(cell, stations(read_run(stored, cell))) if request.frames else ()
+    known = stations(read_run(stored, cell)) if request.frames else {}
+    raise_findings(refusals(*(partial(require_frame_numbers, cell.robot(name), known[name]) for name in known)))
+    pendants = pendant_frames(cell, known) if request.frames else ()
     read = [stored_series(stored, place, cell) for place in stored.records]
     motions = [{robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots} for _, q in read]
     start = {name: q[0] for name, q in motions[0].items()}

@@ -59,6 +59,7 @@ class Dialect:
     has_part_targets: bool = False  # whether rows can be poses of tools on the part while robots move in step
     has_seams_in_step: bool = False  # or whether the tool of the only arm then moves on lines and arcs in its frame
     has_joint_seams: bool = False  # whether points of these are stated as joints of all robots
+    frame_numbers: tuple[int, int] | None = None  # smallest and largest of the frames that paced programs need
     repeats_seams: bool = False  # whether its programs may pass a seam more than once
     moves: tuple[Moves, ...] = (Moves.JOINTS,)  # how its programs can move tools where they work
     # configuration of arms as its targets state it, for joints in [rad] or [m], shape (N, n) to (N, k); an

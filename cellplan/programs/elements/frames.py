@@ -1,6 +1,6 @@
 """Frames that a controller counts from: its base C, and its flange G; those of the model, B and F, unless stated."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -55,6 +55,23 @@ def part_pose(frame: ExportFrame, robot: str, task: str, q: Mapping[str, Array])
     X_FP = inverse(on_flange(holder, np.eye(4))) @ station.X
     X_WP: Array = holder.X_WB @ carried_poses(holder, q[holder.name], X_FP)
     return X_WP
+
+
+def require_frame_numbers(robot: Robot, stations: Sequence[Station], *, needed: tuple[int, int] | None = None) -> None:
+    """Refuse fewer numbers of frames than poses of the part in which a robot works; there are no stations if not known.
+
+    ``needed`` has the smallest and the largest number where programs need some; None where they can do without.
+    """
+    control, poses = robot.control, [", ".join(station.tasks) for station in stations if station.X is not None]
+    numbers = () if control is None else control.frames
+    if not numbers and control is not None and control.base_number and len(poses) <= 1:
+        numbers = (control.base_number,)
+    if len(numbers) < len(poses) if numbers else needed is not None:
+        count = "1 number" if len(poses) == 1 else f"{len(poses)} numbers"
+        each = f"{count}, one for each pose of the part in which it works ({'; '.join(poses)})"
+        what = each if poses else "the numbers of the frames of the part"
+        what += f", {needed[0]} to {needed[1]}" if needed else ""
+        raise InputError(f"robots.{robot.name}.controller.frames: expected {what}, got {len(numbers) or 'none'}")
 
 
 def require_rest(robot: str, station: Station) -> None:

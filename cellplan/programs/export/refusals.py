@@ -1,6 +1,6 @@
 """Refusals: what speaks against an export before anything is computed, all of it at once."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -13,6 +13,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.report.exported import ExportFrame, Moves, Promise
 from cellplan.model.report.verified_run import AnyRun, ReadRun, UnsolvedRun
 from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.frames import require_frame_numbers
 from cellplan.programs.elements.handshake import require_signals
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import Choice, exported_robots, refuse_unknown_robots
@@ -137,9 +138,7 @@ def frame_of(run: AnyRun, dialect: Dialect, robots: Sequence[str], promise: Prom
         moves=choice.moves,
         split=choice.split,
     )
-    if isinstance(run, UnsolvedRun) or not dialect.has_seams(frame):
-        return frame
-    return replace(frame, stations=stations(run))
+    return replace(frame, stations=stations(run)) if dialect.has_seams(frame) else frame
 
 
 def refuse_unfit(run: ReadRun | UnsolvedRun, dialect: Dialect, choice: Choice) -> None:
@@ -205,10 +204,21 @@ def unmet_demands(run: AnyRun, dialect: Dialect, frame: ExportFrame, choice: Cho
     if frame.promise.waits:
         yield from refusals(*(partial(require_signals, frame, robot.name) for robot in frame.cell.robots))
 
+    yield from refusals(*_frame_demands(dialect, frame))
+
     def rows() -> int:
         return max((len(program.times) for program in run_programs(run)), default=0)
 
     yield from refusals(lambda: raise_findings(refusals(*dialect.demands(frame, rows))))
+
+
+def _frame_demands(dialect: Dialect, frame: ExportFrame) -> Iterator[Callable[[], object]]:
+    """What programs of lines need of the numbers of frames, of robots that work."""
+    needed = dialect.frame_numbers if frame.promise is Promise.PACED else None
+    for name in dict.fromkeys(task.robot for task in frame.cell.tasks if task.robot in frame.robots):
+        control = frame.robot(name).control
+        if control is None or frame.cell.controllers[control.id].kind in dialect.kinds:
+            yield partial(require_frame_numbers, frame.robot(name), frame.stations.get(name, ()), needed=needed)
 
 
 def is_at_cycle(dialect: Dialect, promise: Promise) -> bool:

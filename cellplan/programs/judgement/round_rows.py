@@ -17,7 +17,7 @@ from cellplan.certify.lever_arms import LeverArms
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.measures.tool_errors import error_lengths, part_poses, relative_to_task_frame
 from cellplan.model.cell.cell import Relation, stacked_positions
-from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows
+from cellplan.model.report.exported import ExportJob, Moves, ProgramRows, RobotRows
 from cellplan.programs.elements.corners import LARGEST_SHARE, may_round, row_shares, units_of
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.judgement.judge import played_programs
@@ -66,7 +66,7 @@ def with_rounding(
         programs, largest = [], 0.0
         played = played_programs(shared.run, dialect, rounded, _plain(read or job.programs), lead=lead)
         for place, (program, executed) in enumerate(zip(job.programs, played, strict=True)):
-            chosen = _Choice(dialect.shares, rounded, program, executed, shared)
+            chosen = _Choice(dialect, rounded, program, executed, shared)
             chosen.keep_demands()
             if orders:
                 chosen.keep_orders(orders[place])
@@ -98,15 +98,16 @@ class _Choice:
 
     def __init__(
         self,
-        ladder: Sequence[float],
+        dialect: Dialect,
         job: ExportJob,
         program: ProgramRows,
         played: ExecutedProgram,
         shared: Shared,
     ) -> None:
-        self._ladder = np.array(ladder[::-1])  # shares that the format can state, the smallest first
+        self._ladder = np.array(dialect.shares[::-1])  # shares that the format can state, the smallest first
         self._job, self._given, self._played, self._shared = job, program, played, shared
         self._units = units_of(job.frame)
+        self._is_linear = job.frame.moves is Moves.LINEAR and dialect.has_seams(job.frame)
         self._free = may_round(program, self._units)
         self._chosen = {name: np.where(free, self._ladder[-1], 0.0) for name, free in self._free.items()}
         self._times = {name: times_of(played.rows[name]) for name in self._chosen}
@@ -127,6 +128,10 @@ class _Choice:
         known: list[tuple[int, Mapping[str, slice]]] = []
         for stretch in self._played.stretches():
             inside = {name: _inside(times, stretch) for name, times in self._times.items()}
+            if self._is_replaced(stretch, inside):
+                for name, rows in inside.items():
+                    self._chosen[name][rows] = 0.0
+                continue
             played, before = self._played.rows, (o for place, o in known if place == stretch.place)
             alike = (o for o in before if all(_are_alike(played[n], self._free[n], o[n], inside[n]) for n in inside))
             same = next(alike, None)
@@ -136,6 +141,14 @@ class _Choice:
             else:
                 for name, rows in inside.items():
                     self._chosen[name][rows] = self._chosen[name][same[name]]
+
+    def _is_replaced(self, stretch: ExecutedStretch, inside: Mapping[str, slice]) -> bool:
+        """Whether lines and arcs take the place of all rows of a phase that may be rounded."""
+        arms = {entry.task.robot for entry in stretch.motion.schedule.tasks}
+        on_lines = {name for unit in self._units if arms.intersection(unit) for name in unit}
+        free = {name: self._free[name][rows] for name, rows in inside.items()}
+        has_others = any(flags[[0, -1]].any() or (name not in on_lines and flags.any()) for name, flags in free.items())
+        return self._is_linear and not has_others
 
     def keep_orders(self, orders: Orders) -> None:
         """Take back what does not keep its distance in every order between two marks."""

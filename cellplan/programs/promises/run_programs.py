@@ -93,7 +93,7 @@ def spoilt_by_another_order(cell: Cell, program: RunProgram) -> Iterator[str]:
 
 def holders_rest(cell: Cell, phases: Iterable[Phase]) -> bool:
     """Whether no order of the robots spoils anything in any motion of some phases: see ``spoilt_by_another_order``."""
-    tasks = [(phase, cell.task(name)) for phase in phases for name in phase.tasks]
+    tasks = [(phase, task) for phase in phases for task in cell.tasks if task.name in phase.tasks]
     return len(cell.positioners) < 2 and all(
         task.relative_to is Frame.WORLD or not ({*cell.positioners} - {*unit_of(cell, task.robot)}) & {*phase.moving}
         for phase, task in tasks

@@ -5,21 +5,20 @@ controller holds has a frame that goes with the flange of this robot, whether it
 robot by itself can state fixed frames only, it has such a frame as long as the part is at rest.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, inverse, rotation_vector
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.report.exported import Station
-from cellplan.model.report.verified_run import ReadRun, VerifiedRun
+from cellplan.model.report.verified_run import AnyRun, ReadRun, UnsolvedRun, VerifiedRun
 from cellplan.model.task.task import Frame, Task
 from cellplan.programs.elements.frames import controller_base, on_flange
 from cellplan.programs.elements.joints import on_one_controller, unit_of
-from cellplan.programs.promises.run_programs import run_programs
+from cellplan.programs.promises.run_programs import holders_rest, run_programs
 from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
@@ -27,21 +26,43 @@ FIXED: Final = frozenset({"fanuc", "kuka", "staubli", "ur", "yaskawa"})  # kinds
 SAME_TOL: Final = 1e-6  # [m] and [rad] within which poses of a part are one
 
 
-def stations(run: VerifiedRun | ReadRun) -> dict[str, tuple[Station, ...]]:
+def stations(run: AnyRun) -> dict[str, tuple[Station, ...]]:
     """The stations of every robot that works, by its name, in the order of their first use.
 
-    ``InputError`` where a cell states numbers of frames, and fewer than a robot has stations.
+    Those of a cell that was not solved are known where the part rests while tools work, in poses that the cell states;
+    there are none else.
     """
-    cells = DemandedProgram.of(run.cell).cells
     by_robot: dict[str, list[Station]] = {}
+    for cell, task, q in _resting(run.cell) if isinstance(run, UnsolvedRun) else _worked(run):
+        _join(by_robot.setdefault(task.robot, []), _station(cell, task, q))
+    return {robot.name: _numbered(robot, by_robot[robot.name]) for robot in run.cell.robots if robot.name in by_robot}
+
+
+def _worked(run: VerifiedRun | ReadRun) -> Iterator[tuple[Cell, Task, Array]]:
+    """Each task with the cell in its phase and the stacked joints in [rad] or [m] while its tool works, (N, nq)."""
+    cells = DemandedProgram.of(run.cell).cells
     for program in run_programs(run):
         first = {name: int(np.argmax(inside)) for name, inside in program.process.items() if np.any(inside)}
         for name in sorted(first, key=first.__getitem__):
             rows = np.flatnonzero(program.process[name])
             cell = cells[program.phase_at(int(rows[len(rows) // 2])).place]
-            task = cell.task(name)
-            _join(by_robot.setdefault(task.robot, []), _station(cell, task, program.q[rows]))
-    return {robot.name: _numbered(robot, by_robot[robot.name]) for robot in run.cell.robots if robot.name in by_robot}
+            yield cell, cell.task(name), program.q[rows]
+
+
+def _resting(cell: Cell) -> Iterator[tuple[Cell, Task, Array]]:
+    """Likewise where the robot that holds the part rests, at the joints that the cell states for it, shape (1, nq)."""
+    demanded = DemandedProgram.of(cell)
+    phases, cells = demanded.plan.program, demanded.cells
+    names = [task.name for task in cell.tasks]  # moves of the part by itself are none of them
+    work = [(o, name) for phase, o in zip(phases, cells, strict=False) for name in phase.tasks if name in names]
+    starts = [other.robot(holder).start for other, _ in work for holder in cell.positioners]
+    if not holders_rest(cell, phases) or any(start is None for start in starts):
+        return
+    for other, name in work:
+        q = np.zeros((1, cell.joint_count))
+        for holder in cell.positioners:
+            q[:, cell.columns(holder)] = other.robot(holder).start
+        yield other, other.task(name), q
 
 
 def _station(cell: Cell, task: Task, q: Array) -> Station:
@@ -88,11 +109,5 @@ def _numbered(robot: Robot, known: Sequence[Station]) -> tuple[Station, ...]:
     numbers = () if control is None else control.frames
     if not numbers and control is not None and control.base_number and count == 1:
         numbers = (control.base_number,)
-    if numbers and len(numbers) < count:
-        poses = "; ".join(", ".join(station.tasks) for station in known if station.X is not None)
-        raise InputError(
-            f"robots.{robot.name}.controller.frames: expected {count} numbers, one for each pose of the part in which "
-            f"it works ({poses}), got {len(numbers)}"
-        )
     left = iter(numbers)
     return tuple(station if station.X is None else replace(station, number=next(left, None)) for station in known)

@@ -262,7 +262,6 @@ def test_what_lines_need_of_the_cell_is_refused_at_its_key() -> None:
         return str(error.value)
 
     key = "robots.alpha.controller"
-    assert said(frames=()) == f"{key}.frames: expected the numbers of the frames of the part, 1 to 9, got none"
     assert said(tool_number=None).startswith(f"{key}.tool_number: expected the number of its tool frame")
     held = (Station(tasks=("work_of_alpha",), number=4, holder="table", X=np.eye(4)),)
     assert said(held).startswith("--moves linear: expected a part that no group of 'r30' holds, got 'table'")

@@ -10,10 +10,15 @@ from cellplan import load_cell, open_gate, solve, write_run
 from cellplan.errors import InputError
 from cellplan.files.run.stored import read_stored_run
 from cellplan.geometry.transforms import Array, inverse, pose
-from cellplan.model.cell.cell import Cell
-from cellplan.model.report.verified_run import ReadRun
+from cellplan.model.cell.cell import Cell, Mode
+from cellplan.model.report.exported import Moves
+from cellplan.model.report.verified_run import ReadRun, UnsolvedRun
 from cellplan.model.settings.controllers import ControllerEntry, KindName, RobotControlEntry
 from cellplan.model.task.task import Frame
+from cellplan.programs.dialects import DIALECTS
+from cellplan.programs.elements.frames import require_frame_numbers
+from cellplan.programs.export.choice import Choice
+from cellplan.programs.export.refusals import refuse_unfit
 from cellplan.programs.promises.stations import stations
 from cellplan.runs.gate.open_gate import read_run
 from cellplan.runs.gate.stored_cell import load_stored_cell
@@ -145,12 +150,55 @@ def test_poses_are_numbered_in_the_order_of_work_and_each_counts_once(in_turn: R
     assert [(station.tasks, station.number) for station in stations(together)["abb"]] == [
         (("circle", "rhombus", "rectangle"), 4)
     ]
+
+    def said(needed: tuple[int, int] | None = None, **stated: object) -> str:
+        short = connected(alone, abb=control(**stated))
+        with pytest.raises(InputError) as caught:
+            require_frame_numbers(short.cell.robot("abb"), stations(short)["abb"], needed=needed)
+        return str(caught.value)
+
+    key, poses = "robots.abb.controller.frames: expected", "in which it works (circle; rhombus; rectangle)"
+    assert said(frames=[4, 7]) == f"{key} 3 numbers, one for each pose of the part {poses}, got 2"
+    assert said((1, 9)) == f"{key} 3 numbers, one for each pose of the part {poses}, 1 to 9, got none"
+    assert said((1, 9), base_number=3).endswith("1 to 9, got none")
+
+
+def test_a_cell_that_was_not_solved_has_the_same_frames_where_the_part_rests(in_turn: ReadRun, cells: Path) -> None:
+    known, unsolved = stations(in_turn), stations(UnsolvedRun(cell=load_cell(cells / "in_turn.yaml")))
+
+    assert list(unsolved) == list(known)
+    for name, of_robot in known.items():
+        for one, other in zip(of_robot, unsolved[name], strict=True):
+            assert (one.tasks, one.holder, one.number) == (other.tasks, other.holder, other.number)
+            np.testing.assert_allclose(other.X, one.X, atol=1e-9)  # tables have twelve decimals of a degree
+
+
+def test_a_cell_that_was_not_solved_has_no_frames_where_the_part_moves(moving: ReadRun) -> None:
+    assert stations(UnsolvedRun(cell=moving.cell)) == {}
+
+
+def test_moves_in_which_a_part_is_taken_are_no_work(cells: Path) -> None:
+    cell = load_cell(cells / "three_tasks_each.yaml")
+    at_rest = replace(cell, motion=replace(cell.motion, mode=Mode.SEMI_COORDINATED))
+
+    assert stations(UnsolvedRun(cell=cell)) == {}
+    assert {name for known in stations(UnsolvedRun(cell=at_rest)).values() for one in known for name in one.tasks} == {
+        task.name for task in cell.tasks
+    }
+
+
+def test_a_short_list_of_frames_is_said_with_all_else_that_is_missing(in_turn: ReadRun) -> None:
+    """The tool has no number, no signal is stated, and the arm works on the part in one pose but has no frame."""
+    fanuc = connected(in_turn, abb=control())
+    controllers = {**in_turn.cell.controllers, "c": ControllerEntry(kind="fanuc")}
+    run = UnsolvedRun(cell=replace(fanuc.cell, controllers=controllers))
+
     with pytest.raises(InputError) as caught:
-        stations(connected(alone, abb=control(frames=[4, 7])))
-    assert str(caught.value) == (
-        "robots.abb.controller.frames: expected 3 numbers, one for each pose of the part in which it works (circle; "
-        "rhombus; rectangle), got 2"
-    )
+        refuse_unfit(run, DIALECTS["fanuc_ls"], Choice(moves=Moves.LINEAR))
+
+    keys = {line.split(": ")[0].removeprefix("robots.abb.controller.") for line in str(caught.value).splitlines()}
+    assert {"frames", "tool_number", "handshake"} <= keys
+    assert "expected 1 number, one for each pose of the part in which it works (rhombus), 1 to 9" in str(caught.value)
 
 
 def test_the_base_number_is_that_of_the_only_frame(in_turn: ReadRun) -> None:

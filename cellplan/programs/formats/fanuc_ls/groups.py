@@ -136,19 +136,17 @@ def demands(frame: ExportFrame, _rows: Callable[[], int] = int) -> Iterator[Call
         has_task = any(task.robot == name for task in frame.cell.tasks)
         if frame.promise is Promise.PACED and has_task:
             yield partial(_require_stations, frame, name)
+            yield partial(_require_tool, frame, name)
             yield partial(configuration, robot, np.zeros((1, len(robot.model.joints))))
         elif frame.promise is Promise.SYNCHRONISED and frame.moves is not Moves.JOINTS and has_task:
             yield partial(_require_tool, frame, name)
 
 
 def _require_stations(frame: ExportFrame, robot: str) -> None:
-    """Refuse linear moves without the numbers of their frames, and on a part that another group holds."""
-    control, key = frame.robot(robot).control, f"robots.{robot}.controller"
-    if control is None or not (control.frames or control.base_number):
-        raise InputError(f"{key}.frames: expected the numbers of the frames of the part, 1 to {FRAMES[1]}, got none")
-    _require_tool(frame, robot)
+    """Refuse linear moves on a part that another group holds."""
+    control = frame.robot(robot).control
     for station in frame.stations.get(robot, ()):
-        if station.holder is not None:
+        if station.holder is not None and control is not None:
             raise InputError(
                 f"--moves linear: expected a part that no group of '{control.id}' holds, got '{station.holder}': "
                 "fanuc_ls moves tools by joints there"

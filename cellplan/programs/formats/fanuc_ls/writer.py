@@ -18,7 +18,7 @@ from cellplan.programs.elements.paced import moves_of
 from cellplan.programs.elements.pages import SLOW, PagedProgram, paged, pages_of, percentages, robots_of
 from cellplan.programs.elements.text import comment
 from cellplan.programs.elements.timed_rows import shared_clock
-from cellplan.programs.formats.fanuc_ls.groups import KIND, TpProgram, demands, seam_name, tp_programs
+from cellplan.programs.formats.fanuc_ls.groups import FRAMES, KIND, TpProgram, demands, seam_name, tp_programs
 from cellplan.programs.formats.fanuc_ls.output import TpText, frames, instruction, joint_pose
 from cellplan.programs.formats.fanuc_ls.player import MOST_MS
 from cellplan.programs.formats.fanuc_ls.poses import configuration
@@ -152,6 +152,7 @@ FANUC_LS: Final[Dialect] = Dialect(
     configuration=configuration,
     has_seams_in_step=True,
     has_joint_seams=True,
+    frame_numbers=(1, FRAMES[1]),
     speeds=percentages,
     demands=demands,
 )

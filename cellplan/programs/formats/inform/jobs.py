@@ -152,14 +152,12 @@ def _require_numbers(robot: Robot) -> None:
 
 
 def _require_frames(frame: ExportFrame, robot: Robot) -> None:
-    """Refuse stations without the number of a user frame, or with a frame that another robot moves."""
+    """Refuse numbers that no user frame has, and frames that another robot moves."""
     control = robot.control
     stated = [] if control is None else [*control.frames, *([control.base_number] if control.base_number else [])]
-    stations = frame.stations.get(robot.name, ())
-    numbers = [station.number for station in stations if station.X is not None] if stations else [*stated, None][:1]
-    for number in numbers:
+    for number in stated:
         _require_within(f"robots.{robot.name}.controller.frames", number, FRAMES, "each user frame")
-    for station in stations:
+    for station in frame.stations.get(robot.name, ()):
         require_rest(robot.name, station)
 
 

@@ -24,6 +24,7 @@ from cellplan.programs.elements.paced import NO_SHAPE, Events, Move, blocks, mov
 from cellplan.programs.elements.pages import PagedProgram, paged, percentages, robots_of
 from cellplan.programs.elements.text import ascii_text, comment, fixed, joined
 from cellplan.programs.formats.inform.jobs import (
+    FRAMES,
     KIND,
     JobFrame,
     demands,
@@ -251,5 +252,6 @@ INFORM: Final = Dialect(
     demands=demands,
     moves=tuple(Moves),
     configuration=configuration,
+    frame_numbers=FRAMES,
     speeds=percentages,
 )
