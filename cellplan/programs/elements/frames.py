@@ -68,8 +68,8 @@ def require_frame_numbers(robot: Robot, stations: Sequence[Station], *, needed: 
         numbers = (control.base_number,)
     if len(numbers) < len(poses) if numbers else needed is not None:
         count = "1 number" if len(poses) == 1 else f"{len(poses)} numbers"
-        each = f"{count}, one for each pose of the part in which it works ({'; '.join(poses)})"
-        what = each if poses else "the numbers of the frames of the part"
+        counted = f"{count}, one for each pose of the part in which it works ({'; '.join(poses)})"
+        what = counted if poses else "the numbers of the frames of the part"
         what += f", {needed[0]} to {needed[1]}" if needed else ""
         raise InputError(f"robots.{robot.name}.controller.frames: expected {what}, got {len(numbers) or 'none'}")
 

@@ -128,7 +128,7 @@ class _Choice:
         known: list[tuple[int, Mapping[str, slice]]] = []
         for stretch in self._played.stretches():
             inside = {name: _inside(times, stretch) for name, times in self._times.items()}
-            if self._is_replaced(stretch, inside):
+            if self._is_linear and _are_replaced(stretch, self._free, inside, self._units):
                 for name, rows in inside.items():
                     self._chosen[name][rows] = 0.0
                 continue
@@ -141,14 +141,6 @@ class _Choice:
             else:
                 for name, rows in inside.items():
                     self._chosen[name][rows] = self._chosen[name][same[name]]
-
-    def _is_replaced(self, stretch: ExecutedStretch, inside: Mapping[str, slice]) -> bool:
-        """Whether lines and arcs take the place of all rows of a phase that may be rounded."""
-        arms = {entry.task.robot for entry in stretch.motion.schedule.tasks}
-        on_lines = {name for unit in self._units if arms.intersection(unit) for name in unit}
-        free = {name: self._free[name][rows] for name, rows in inside.items()}
-        has_others = any(flags[[0, -1]].any() or (name not in on_lines and flags.any()) for name, flags in free.items())
-        return self._is_linear and not has_others
 
     def keep_orders(self, orders: Orders) -> None:
         """Take back what does not keep its distance in every order between two marks."""
@@ -253,6 +245,16 @@ def _inside(times: Array, stretch: ExecutedStretch) -> slice:
     """Rows in a phase, both ends included, from their times in [s], shape (N,)."""
     first, last = np.searchsorted(times, [stretch.begin - SAME_TIME, stretch.end + SAME_TIME])
     return slice(int(first), int(last))
+
+
+def _are_replaced(
+    stretch: ExecutedStretch, free: Mapping[str, Flags], inside: Mapping[str, slice], units: Sequence[Sequence[str]]
+) -> bool:
+    """Whether lines and arcs take the place of all rows of a phase that may be rounded."""
+    arms = {entry.task.robot for entry in stretch.motion.schedule.tasks}
+    on_lines = {name for unit in units if arms.intersection(unit) for name in unit}
+    left = {name: free[name][rows] for name, rows in inside.items()}
+    return not any(flags[[0, -1]].any() or (name not in on_lines and flags.any()) for name, flags in left.items())
 
 
 def _are_alike(rows: RobotRows, free: Flags, one: slice, other: slice) -> bool:
