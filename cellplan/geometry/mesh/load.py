@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cellplan.cache import Key, keep, key_of, recall
 from cellplan.errors import InputError
+from cellplan.geometry.arrays import Indices
 from cellplan.geometry.mesh.formats.collada_file import parse_collada
 from cellplan.geometry.mesh.formats.polygons import Triangles
 from cellplan.geometry.mesh.formats.stl_obj import parse_mesh, require_likely_count, unknown_format
@@ -201,6 +202,21 @@ def corner_normals(mesh: Mesh, crease: float = CREASE) -> Array:
     shared = length[group] > FLAT_FRACTION  # the normals round a spike can cancel: there the triangle's own one stands
     smooth: Array = np.where(shared, summed[group] / np.where(shared, length[group], 1.0), flat)
     return smooth.reshape(-1, 3, 3)
+
+
+def normals_at(mesh: Mesh, points: Array, faces: Indices) -> Array:
+    """Outward normals at points on triangles, shape (N, 3): the corners' normals, by barycentric coordinates.
+
+    Points are in the frame of the mesh, shape (N, 3), ``faces`` are their triangles, shape (N,).
+    """
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces[faces]], 1, 0)
+    across = np.cross(b - a, c - a)
+    square = np.sum(across * across, axis=1)
+    weight_b = np.sum(np.cross(points - a, c - a) * across, axis=1) / square
+    weight_c = np.sum(np.cross(b - a, points - a) * across, axis=1) / square
+    weights = np.stack([1.0 - weight_b - weight_c, weight_b, weight_c], axis=1)
+    blended = np.einsum("ni,nij->nj", weights, corner_normals(mesh)[faces])
+    return blended / np.linalg.norm(blended, axis=1, keepdims=True)
 
 
 def contains(mesh: Mesh, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

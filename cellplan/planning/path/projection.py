@@ -4,13 +4,12 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.errors import InputError
 from cellplan.geometry.curves.arc_length import measure
 from cellplan.geometry.curves.curve import Curve, smooth_through
 from cellplan.geometry.curves.surface_patch import Patch, ProjectedCurve, patches_facing
-from cellplan.geometry.mesh.load import corner_normals, ray_hits
+from cellplan.geometry.mesh.load import normals_at, ray_hits
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere, bounding_sphere, support
 from cellplan.geometry.transforms import Array, inverse, transform_points
 from cellplan.model.cell.cell import Part
@@ -97,7 +96,7 @@ def _project_onto_mesh(path: PathCurve, direction: Array, part: Part, *, where: 
     if not np.all(hits.is_hit):
         raise InputError(_missed(where, points[int(np.argmin(hits.is_hit))], direction, part=part))
     p = points + (away - hits.distance)[:, None] * direction
-    normals = _mesh_normals(mesh, hits.points, hits.faces) @ part.X_PS[:3, :3].T
+    normals = normals_at(mesh, hits.points, hits.faces) @ part.X_PS[:3, :3].T
     _refuse_flat_view(p, normals, direction, where=where)
     _refuse_creases(p, normals, where)
     breaks = np.isin(u, path.stops)
@@ -117,18 +116,6 @@ def _ray_parameters(path: PathCurve) -> Array:
         for low, high, count in zip(stops[:-1], stops[1:], counts, strict=True)
     ]
     return np.concatenate([*pieces, stops[-1:]])
-
-
-def _mesh_normals(mesh: Mesh, points: Array, faces: NDArray[np.int64]) -> Array:
-    """Outward normals at points on triangles: the corners' normals, weighted by barycentric coordinates."""
-    a, b, c = np.moveaxis(mesh.vertices[mesh.faces[faces]], 1, 0)
-    across = np.cross(b - a, c - a)
-    square = np.sum(across * across, axis=1)
-    weight_b = np.sum(np.cross(points - a, c - a) * across, axis=1) / square
-    weight_c = np.sum(np.cross(b - a, points - a) * across, axis=1) / square
-    weights = np.stack([1.0 - weight_b - weight_c, weight_b, weight_c], axis=1)
-    blended = np.einsum("ni,nij->nj", weights, corner_normals(mesh)[faces])
-    return blended / np.linalg.norm(blended, axis=1, keepdims=True)
 
 
 def _refuse_flat_view(p: Array, normals: Array, direction: Array, *, where: str) -> None:
