@@ -94,12 +94,10 @@ def read_drawing(path: Path, file: str, shape: str | None, gap: float) -> StepDr
     """
     content = read_solids(path, file, shape)
     solids = content.solids
-    for solid, name in zip(solids, _labels([solid.name for solid in solids], "PART_{}", []), strict=True):
-        solid.name = name
+    of_faces = names_of_faces(solids)
     if sum(len(solid.edges) for solid in solids) > MOST_EDGES:
         raise InputError(f"{file}: expected at most {MOST_EDGES} edges, got more; choose a part of it with shape")
     used = [solid.name for solid in solids]
-    of_faces = _labels([name for solid in solids for name in solid.names_of_faces], "F{}", used)
     of_edges = _labels([name for solid in solids for name in solid.names_of_edges], "E{}", [])
     faces, edges = [], []
     for solid in solids:
@@ -117,6 +115,14 @@ def read_drawing(path: Path, file: str, shape: str | None, gap: float) -> StepDr
         unused=tuple(content.unused),
         penetrating=tuple((used[a], used[b]) for a, b in penetrating(solids)),
     )
+
+
+def names_of_faces(solids: Sequence[Solid]) -> list[str]:
+    """Names that differ for the faces of all solids, one solid after the other; the solids get such names as well."""
+    used = _labels([solid.name for solid in solids], "PART_{}", [])
+    for solid, name in zip(solids, used, strict=True):
+        solid.name = name
+    return _labels([name for solid in solids for name in solid.names_of_faces], "F{}", used)
 
 
 def _edge(solid: Solid, k: int, name: str, faces: Sequence[str], file: str) -> StepEdge:

@@ -3,7 +3,7 @@
 Lengths are in [m] outside of this file and in [mm] inside it, as OpenCASCADE reads them.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from importlib.util import find_spec
 from itertools import pairwise
@@ -242,6 +242,35 @@ class Solid:
                 uv = np.array([(mesh.UVNode(k + 1).X(), mesh.UVNode(k + 1).Y()) for k in range(mesh.NbNodes())])
                 off = _deviation(face, corners, uv, indices, deviation)
             yield corners, indices if face._sign > 0.0 else indices[:, ::-1], off
+
+
+def first_hits(solids: Sequence[Solid], points: Array, direction: Array) -> tuple[Array, Array]:
+    """Points in [m] and outward normals at which lines through points, shape (N, 3), come into solids from outside.
+
+    Lines run against a unit direction, shape (3,). Rows of lines that miss all solids are not a number.
+    """
+    from OCP.gp import gp_Dir, gp_Lin, gp_Pnt
+    from OCP.IntCurvesFace import IntCurvesFace_ShapeIntersector
+
+    corners = np.concatenate([np.stack(solid.box) for solid in solids])
+    far = float(np.max(corners @ direction)) + float(np.ptp(corners, axis=0).max())
+    meetings = []
+    for solid in solids:
+        meetings.append(IntCurvesFace_ShapeIntersector())
+        meetings[-1].Load(solid.shape, ON_FACE)
+    faces = {hash(face.shape): face for solid in solids for face in solid.faces}
+    feet, normals = np.full(points.shape, np.nan), np.full(points.shape, np.nan)
+    starts = points + np.outer(far - points @ direction, direction)
+    for index, start in enumerate(MM * starts):
+        line, nearest = gp_Lin(gp_Pnt(*start), gp_Dir(*-direction)), np.inf
+        for meeting in meetings:
+            meeting.PerformNearest(line, 0.0, nearest)
+            if meeting.IsDone() and meeting.NbPnt() and meeting.WParameter(1) < nearest:
+                nearest = meeting.WParameter(1)
+                face, uv = faces[hash(meeting.Face(1))], [(meeting.UParameter(1), meeting.VParameter(1))]
+        if np.isfinite(nearest):
+            (feet[index],), (normals[index],) = face.at(np.array(uv))
+    return feet, normals
 
 
 def _deviation(face: Face, corners: Array, uv: Array, indices: Indices, likely: float) -> float:
