@@ -3,6 +3,7 @@
 import json
 import re
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,9 @@ from builders.commands import run_command
 from cellplan import load_cell, solve
 from cellplan.errors import InputError
 from cellplan.files.run.clock_table import parse_clock
+from cellplan.model.task.task import Task
+from cellplan.planning.path.build import build_toolpath
+from cellplan.runs.plan.start import depths_on_paths
 
 # two cuts on the ball, 30 and 15 mm/s, with rapids over it between them
 CUTS = f"""{GCODE_HEAD}S8000 M3
@@ -57,6 +61,19 @@ def test_the_rows_have_the_feed_of_each_cut_and_the_speed_of_rapids(folder: Path
     ends = np.flatnonzero(np.diff(on.astype(int)))
     assert len(ends) in {2, 3}  # off at the rapids, and at the end where a row is left over
     assert speeds[ends[1] + 1 : len(speeds) - 1].max() == pytest.approx(15.0, rel=1e-9)
+
+
+def test_the_distance_from_the_part_is_judged_where_the_process_is_on_before_there_is_a_motion(folder: Path) -> None:
+    cell = load_cell(folder / "cell.yaml")
+    (task,) = cell.tasks
+    lifted = replace(task, path=replace(task.path, is_rapid=np.zeros(len(task.path.speeds), dtype=bool)))
+
+    def failures(task: Task) -> list[str]:
+        part = replace(cell, tasks=(task,))
+        return [check.name for check in depths_on_paths(part, {task.name: build_toolpath(task, cell.part)})]
+
+    assert failures(task) == []
+    assert failures(lifted) == ["standoff"]  # 20 mm above the ball with the process on
 
 
 @pytest.mark.slow
@@ -136,10 +153,10 @@ def test_each_feed_is_a_line_of_its_own_speed_and_rapids_are_out_of_process(fold
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ("    feed_mm_s: 5\n", "tasks.mill.feed_mm_s: unexpected key, the file of the path states the feeds, and its"),
+        ("    feed_mm_s: 5\n", "tasks.mill.feed_mm_s: unexpected key, the file of the path states the feeds, and the"),
         ("    duration_s: 5\n", "tasks.mill.duration_s: unexpected key, the file of the path states the feeds"),
         ("    corners: stop\n", "tasks.mill.corners: unexpected key"),
-        ("    repeat: 2\n", "tasks.mill.repeat: expected 1 for a path whose file states feeds, got 2"),
+        ("    repeat: 2\n", "tasks.mill.repeat: expected 1 for a path with rapids and stops of its own, got 2"),
         ("    process: {feed_mm_s: 5}\n", "tasks.mill.process.feed_mm_s: unexpected key, the file of the path states"),
         ("    tool_axis: normal\n", "tool_axis: normal requires tool axes in the file: have CAM write them"),
     ],

@@ -32,6 +32,7 @@ from cellplan.files.cell.expansion import is_of_entry, with_values
 from cellplan.files.cell.layout.build_layout import read_layout
 from cellplan.files.cell.names import with_stated_names
 from cellplan.files.cell.open_tasks import open_task_findings, open_tasks, unknown_robot_findings, with_first_robots
+from cellplan.files.cell.outlines import outline_paths
 from cellplan.files.cell.referenced_files import Sources, Urdfs
 from cellplan.files.cell.rules.path_rules import path_findings
 from cellplan.files.cell.rules.program_rules import posture_findings, program_findings, with_stand_offs
@@ -222,7 +223,7 @@ def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:
     part = read_part(valid, sources)
     layout, wrong = read_layout(valid, sound, document)
     findings += wrong
-    targets = _targets(valid, sources)
+    targets = _targets(valid, sources, part)
     findings += target_findings(valid, targets, document)
     raise_findings(file, [*findings, *sources.findings], sources.errors)
     if valid.whole is None:
@@ -243,14 +244,15 @@ def _models(valid: ValidEntries, document: YamlDocument, sources: Sources) -> di
     }
 
 
-def _targets(valid: ValidEntries, sources: Sources) -> Targets:
-    """Tool targets from files, and lines along edges of the part, by task."""
+def _targets(valid: ValidEntries, sources: Sources, part: StepPart | None) -> Targets:
+    """Tool targets from files, lines along edges of the part, and outlines on it, by task."""
     samples = {
         name: sources.targets(task.path, ("tasks", name, "path"))
         for name, task in valid.tasks.items()
         if task.path.file_key is not None
     }
-    return {name: path for name, path in samples.items() if path is not None} | edge_lines(valid, sources)
+    read: Targets = {name: path for name, path in samples.items() if path is not None}
+    return {**read, **edge_lines(valid, sources), **outline_paths(valid, sources, part)}
 
 
 def _unknown_bodies(valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:

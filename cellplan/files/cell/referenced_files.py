@@ -19,7 +19,8 @@ from cellplan.files.robots.build_controller import with_zero_of_file
 from cellplan.files.robots.joint_table import RobotTable, load_bundled_table, load_robot_table
 from cellplan.files.robots.rules import limits_in_si, tightened
 from cellplan.files.robots.urdf import XACRO_SUFFIX
-from cellplan.files.schema.path import CamEntry, CsvEntry, GcodeEntry, PathShapeEntry
+from cellplan.files.schema.path import CsvEntry, PathShapeEntry
+from cellplan.files.schema.programmed import CamEntry, GcodeEntry
 from cellplan.files.schema.robot import RobotEntry
 from cellplan.files.schema.tool import GripperEntry
 from cellplan.files.yaml.reader import YamlDocument

@@ -23,10 +23,10 @@ from cellplan.guard import Guard, in_child
 from cellplan.model.settings.units import in_si
 from cellplan.model.units import MM
 
-Value = TypeVar("Value", StepPart, StepDrawing)
+Value = TypeVar("Value")
 MEGABYTES: Final = 3000  # of which OpenCASCADE alone takes some hundreds
 MOST_READ: Final = 16  # results that this process holds
-_READ: Final[dict[Hashable, StepPart | StepDrawing]] = {}
+_READ: Final[dict[Hashable, object]] = {}
 
 
 def read_part(valid: ValidEntries, sources: Sources) -> StepPart | None:
@@ -70,14 +70,19 @@ def _read(read: Callable[..., Value], place: Path, file: str, shape: str | None,
     """What a function reads of a STEP file, and the SHA-256 of the file; what was read last is not read again."""
     require_step(file)
     digest = digest_of_file(place, file=file)
+    guard = Guard(file=file, worker="the STEP reader", megabytes=MEGABYTES)
     key = (read, digest, file, shape, size)
+    return remembered(key, lambda: in_child(read, place, file, shape, size, guard=guard)), digest
+
+
+def remembered(key: Hashable, read: Callable[[], Value]) -> Value:
+    """What was read under a key; read now where it is not among what was read last."""
     if key not in _READ:
-        guard = Guard(file=file, worker="the STEP reader", megabytes=MEGABYTES)
-        content = in_child(read, place, file, shape, size, guard=guard)
+        content = read()
         while len(_READ) >= MOST_READ:
             del _READ[next(iter(_READ))]
         _READ[key] = content
-    return cast("Value", _READ[key]), digest
+    return cast("Value", _READ[key])
 
 
 def edge_length(document: YamlDocument, path: PathEntry, folders: AllowedFolders) -> float | None:

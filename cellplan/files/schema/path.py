@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 from pydantic import Field, Tag, model_validator
 
 from cellplan.files.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
+from cellplan.files.schema.programmed import MOST_JOINED_MM, CamChoice, GcodeChoice, OutlineChoice
 from cellplan.model.settings.entry import (
     FARTHEST_MM,
     Angle,
@@ -13,14 +14,12 @@ from cellplan.model.settings.entry import (
     Direction,
     Entry,
     OneOf,
-    PoseEntry,
-    SlidingSpeed,
     Text,
     by_kind,
     rule,
     setting,
 )
-from cellplan.model.settings.units import Deg, Mm, MmPerS, Within
+from cellplan.model.settings.units import Mm, Within
 
 COEFFICIENT_LIMIT: Final = 400  # more are a table of the motion, not a spline
 
@@ -28,10 +27,8 @@ JointValue = Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)]
 Row = tuple[float, ...] | dict[str, Any]
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
 CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
-CAM_WORDS: Final = "a file name or {file: part.apt, transfer_mm_s: 250}"
 OF_FILES: Final = ("csv", "apt", "gcode")
 MOST_EDGES: Final = 50  # in one path
-MOST_JOINED_MM: Final = 1.0  # points farther apart than this are two points of a path
 
 
 class PolylineEntry(Entry):
@@ -95,40 +92,19 @@ CsvChoice = Annotated[
 ]
 
 
-class CamEntry(Entry):
-    """Tool targets from a file of CAM, with feeds and rapids."""
-
-    file: Text = Field(description="File of the points.")
-    at: PoseEntry = setting(PoseEntry(), "Pose of the file's frame in the part frame.")
-    transfer_mm_s: SlidingSpeed = setting(MmPerS(250.0), "Speed of rapids; the process is off on them.")
-    rounding_mm: Annotated[Mm, Within(gt=0.0, le=MOST_JOINED_MM)] = setting(
-        Mm(0.01), "Largest distance of a corner that is passed without a stop from the straight sides."
-    )
-    stop_deg: Annotated[Deg, Within(gt=0.0, le=90.0)] = setting(
-        Deg(20.0), "Change of direction beyond which the tool stops at a corner."
-    )
-
-
-class GcodeEntry(CamEntry):
-    """Tool targets from G-code."""
-
-    chord_mm: Annotated[Mm, Within(gt=0.0, le=MOST_JOINED_MM)] = setting(
-        Mm(0.01), "Largest distance of an arc from the straight sides that stand for it."
-    )
-
-
-CamChoice = Annotated[
-    Annotated[Text, Tag(f"<{CAM_WORDS}>")] | Annotated[CamEntry, Tag("<mapping>")], by_kind(CAM_WORDS, mapping=dict)
-]
-GcodeChoice = Annotated[
-    Annotated[Text, Tag(f"<{CAM_WORDS}>")] | Annotated[GcodeEntry, Tag("<mapping>")], by_kind(CAM_WORDS, mapping=dict)
-]
-
-
 class PathShapeEntry(OneOf):
     """Exactly one path, and its projection onto the part."""
 
-    alternatives: ClassVar[tuple[str, ...]] = ("circle", "rectangle", "rhombus", "polyline", "edge", "edges", *OF_FILES)
+    alternatives: ClassVar[tuple[str, ...]] = (
+        "circle",
+        "rectangle",
+        "rhombus",
+        "polyline",
+        "edge",
+        "edges",
+        "outline",
+        *OF_FILES,
+    )
 
     circle: CircleEntry | None = setting(None, "Circle.")
     rectangle: RectangleEntry | None = setting(None, "Rectangle.")
@@ -146,6 +122,18 @@ class PathShapeEntry(OneOf):
     start_at_mm: Coordinates | None = setting(
         None, "Point in the part frame; edges that are closed begin where they are nearest to it."
     )
+    outline: OutlineChoice | None = setting(
+        None,
+        "Contours of a layer of a DXF drawing (extra `dxf`), on a plane face of the part (`on`) or projected onto the "
+        "part (`project`), with rapids between them; the tool points against the normal.",
+    )
+    layer: Text | None = setting(None, "Layer of the drawing; required with outline.")
+    on: Text | None = setting(
+        None,
+        "Plane face of the STEP file of the part (`part.step`) that the outline lies on, by name; `cellplan seams` "
+        "lists them. The origin of the drawing is the foot of that of the part frame, its x axis +x of the part frame "
+        "along the face (+y on a face across x), and it is seen from outside; see outline.at.",
+    )
     csv: CsvChoice | None = setting(None, "Tool targets from a file.")
     apt: CamChoice | None = setting(None, "Tool targets, feeds and rapids from a file of APT or CLDATA.")
     gcode: GcodeChoice | None = setting(
@@ -154,7 +142,7 @@ class PathShapeEntry(OneOf):
     project: Direction | None = setting(
         None,
         "Side of the part, as a direction in the part frame, from which the path is projected onto the part; absent: "
-        "not projected.",
+        "not projected. An outline is drawn in the plane across it through the origin, as under `on`.",
     )
     offset_mm: Coordinate | None = setting(
         None, "Shift of a planar path that is not projected along the plane's normal axis; 0 when absent."
@@ -175,10 +163,25 @@ class PathShapeEntry(OneOf):
             raise rule("unexpected key, only edges that are closed begin anywhere", "start_at_mm")
         return self
 
+    @model_validator(mode="after")
+    def _has_ground(self) -> Self:
+        """An outline has a layer, and lies on a face or is projected."""
+        for key in ("layer", "on") if self.outline is None else ():
+            if getattr(self, key) is not None:
+                raise rule("unexpected key, it goes with an outline", key)
+        if self.outline is None:
+            return self
+        if self.layer is None:
+            raise rule("missing, expected the layer of the drawing", "layer")
+        if (self.on is None) == (self.project is None):
+            text = "missing, expected a plane face of the STEP file of the part, or project: +z (or another side)"
+            raise rule(text if self.on is None else "expected either on or project, got both", "on")
+        return self
+
     @property
     def is_planar(self) -> bool:
         """Whether the path is drawn in a plane of the part frame."""
-        return self.polyline.plane is not None if self.polyline is not None else not (self.file_key or self.is_edge)
+        return self.polyline.plane is not None if self.polyline is not None else not (self.file_key or self.is_on_part)
 
     @property
     def file_key(self) -> str | None:
@@ -189,6 +192,16 @@ class PathShapeEntry(OneOf):
     def has_feeds(self) -> bool:
         """Whether the file of the path states feeds."""
         return self.apt is not None or self.gcode is not None
+
+    @property
+    def is_programmed(self) -> bool:
+        """Whether it has rapids and stops of its own."""
+        return self.has_feeds or self.outline is not None
+
+    @property
+    def is_on_part(self) -> bool:
+        """Whether it lies on the part, which holds the tool upright or has walls: edges and outlines."""
+        return self.is_edge or self.outline is not None
 
     @property
     def is_edge(self) -> bool:

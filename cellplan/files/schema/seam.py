@@ -30,6 +30,7 @@ TravelAngle = Annotated[Deg, Within(ge=0.0, le=FLATTEST_DEG)]
 Length = Annotated[Mm, Within(gt=0.0, le=FARTHEST_PART_MM)]
 Dwell = Annotated[float, Field(ge=0.0, le=10.0)]
 WeaveSide = Annotated[Mm, Within(gt=0.0, le=FARTHEST_MM)]
+OF_OUTLINES: Final = ("work_deg", "push_deg", "drag_deg", "standoff_mm", "reverse")  # keys of a seam that they have
 OF_FEED: Final = ("frequency_hz", "dwell_left_s", "dwell_right_s")  # keys whose lengths follow from the feed
 
 
@@ -138,6 +139,15 @@ class PathEntry(PathShapeEntry):
     )
 
     @model_validator(mode="after")
+    def _suits_outline(self) -> Self:
+        """How a tool is held along an outline follows from the normal of the part alone."""
+        for key in self.seam_keys if self.outline is not None else ():
+            if key not in OF_OUTLINES:
+                allowed = ", ".join(OF_OUTLINES)
+                raise rule(f"unexpected key, an outline has {allowed}; it is run as it is drawn", key)
+        return self
+
+    @model_validator(mode="after")
     def _has_its_walls(self) -> Self:
         """Angles have walls, walls have angles, and one of the walls is what the work angle is measured from."""
         if self.push_deg is not None and self.drag_deg is not None:
@@ -206,4 +216,4 @@ class PathEntry(PathShapeEntry):
     @property
     def wall_names(self) -> tuple[str, ...]:
         """Names of the walls beside it."""
-        return tuple(self.walls or ()) or ((SURFACE,) if self.project is not None else ())
+        return tuple(self.walls or ()) or ((SURFACE,) if self.project or self.on else ())

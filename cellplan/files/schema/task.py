@@ -39,7 +39,7 @@ from cellplan.model.units import MM
 
 MOST_DWELL: Final = 0.8  # [-] of the period of a weave
 EXCLUDED_BY_PROCESS: Final = ("duration_s", "feed_mm_s", "time_law", "settle_s")
-EXCLUDED_BY_FILE: Final = (*EXCLUDED_BY_PROCESS, "corners", "tool_turn_deg")  # of a path whose file states feeds
+EXCLUDED_BY_FILE: Final = (*EXCLUDED_BY_PROCESS, "corners", "tool_turn_deg")  # of a path with rapids
 
 Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
 
@@ -51,14 +51,11 @@ VIA_WORDS: Final = "home, service, a list of joint angles or a mapping with one 
 MOST_VIA: Final = 20
 POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
 
-
 ToolAxis = Annotated[
     Annotated[Literal["normal", "+x", "-x", "+y", "-y", "+z", "-z"], Tag(f"<{TOOL_AXIS_WORDS}>")]
     | Annotated[Vector, Tag("<list>")],
     by_kind(TOOL_AXIS_WORDS, list=tuple),
 ]
-
-
 OneRobot = Annotated[
     Name,
     WithJsonSchema(
@@ -287,10 +284,10 @@ class TaskEntry(Entry):
                 raise rule("unexpected key, process decides how fast the tool moves along its path", key)
         if not self.path.has_feeds and self.process is not None and self.process.feed_mm_s is None:
             raise rule("missing, expected the demanded feed, a number above 0 in mm/s", "process.feed_mm_s")
-        if self.relative_to == "world" and (self.path.project is not None or self.path.is_edge):
-            key = "path.project" if self.path.project is not None else "relative_to"
+        if self.relative_to == "world" and (self.path.project is not None or self.path.is_on_part):
+            key = "relative_to" if self.path.is_on_part else "path.project"
             projected = "unexpected key, a path in the world is not projected onto the part"
-            raise rule("expected part for edges of the part, got world" if self.path.is_edge else projected, key)
+            raise rule("expected part for a path on the part, got world" if self.path.is_on_part else projected, key)
         if self.path.is_seam and self.tool_axis is not None:
             raise rule("unexpected key, the walls and angles of the path say how the tool is held", "tool_axis")
         if self.start_deg is not None and self.start is not None:
@@ -314,16 +311,19 @@ class TaskEntry(Entry):
 
     @model_validator(mode="after")
     def _agrees_with_file(self) -> Self:
-        """A file that states feeds decides how fast the tool moves, and where it stops."""
-        for key in EXCLUDED_BY_FILE if self.path.has_feeds else ():
+        """A file that states feeds decides how fast the tool moves; a path with rapids has stops of its own."""
+        if self.path.outline is not None and self.process is None:
+            raise rule("missing, expected the feed along an outline, such as {feed_mm_s: 20}", "process")
+        by = "file of the path states the feeds" if self.path.has_feeds else "process has the feed"
+        for key in EXCLUDED_BY_FILE if self.path.is_programmed else ():
             if getattr(self, key):
-                raise rule("unexpected key, the file of the path states the feeds, and its entry the stops", key)
+                raise rule(f"unexpected key, the {by}, and the entry of the path the stops", key)
         if self.path.has_feeds and self.process is not None and self.process.feed_mm_s is not None:
             raise rule("unexpected key, the file of the path states the feeds", "process.feed_mm_s")
         for key in self.path.seam_keys if self.path.has_feeds else ():
             raise rule("unexpected key, a path of CAM is used as it stands in the file", f"path.{key}")
-        if self.path.has_feeds and self.repeat > 1:
-            raise rule(f"expected 1 for a path whose file states feeds, got {self.repeat}", "repeat")
+        if self.path.is_programmed and self.repeat > 1:
+            raise rule(f"expected 1 for a path with rapids and stops of its own, got {self.repeat}", "repeat")
         return self
 
     @model_validator(mode="after")

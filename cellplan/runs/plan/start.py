@@ -9,13 +9,15 @@ import numpy as np
 from cellplan.checks.clearance.mounting import CURES, check_mounting
 from cellplan.checks.clearance.tool_depth import check_depths, check_standoffs
 from cellplan.errors import StartNotFoundError
+from cellplan.geometry.arrays import Array
+from cellplan.geometry.curves.curve import chord_lengths
 from cellplan.measures.standoff import standoff_on
 from cellplan.measures.tool_depth import AXIS_COMPONENTS, path_depth
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import Check
 from cellplan.model.task.clocked_path import ClockedPath
-from cellplan.model.task.task import Frame
+from cellplan.model.task.task import Frame, ProgrammedPath, Task
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.start.search import StartChoice, choose_start
 from cellplan.scene.bodies import Kind
@@ -105,11 +107,21 @@ def depths_on_paths(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> list[Check
     depths = [path_depth(cell, cell.task(name), toolpath.spread(POSES)) for name, toolpath in toolpaths.items()]
     checks = check_depths(cell, [depth for depth in depths if depth is not None])
     tips = [
-        standoff_on(cell, cell.task(name), path.spread(POSES))
+        standoff_on(cell, cell.task(name), _at_work(cell.task(name), path))
         for name, path in toolpaths.items()
         if _on_part(cell, name)
     ]
     return [check for check in (*checks, *check_standoffs(cell, tips)) if not check.passed]
+
+
+def _at_work(task: Task, toolpath: Toolpath) -> Array:
+    """Tool poses along a path, shape (N, 4, 4), without those on its rapids."""
+    poses = toolpath.spread(POSES)
+    if not isinstance(task.path, ProgrammedPath):
+        return poses
+    behind = toolpath.arc.lengths(chord_lengths(task.path.points))
+    sides = np.searchsorted(behind, np.linspace(0.0, toolpath.length, POSES), side="right") - 1
+    return poses[~task.path.is_rapid[np.minimum(sides, len(task.path.is_rapid) - 1)]]
 
 
 def _on_part(cell: Cell, name: str) -> bool:

@@ -237,7 +237,7 @@ def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
     if entry.tool_axis not in {None, "normal"}:
         return entry.tool_axis, entry.tool_x
     path = entry.path
-    is_given = path.project is not None or path.file_key is not None or path.is_edge
+    is_given = path.project is not None or path.file_key is not None or path.is_on_part
     if path.is_seam or is_given or needs_surface(entry):
         return None, entry.tool_x
     shape = path.circle or path.rectangle or path.rhombus or path.polyline
@@ -263,7 +263,7 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
             entry.setdefault("tool_depth_mm", document.checks.tool_depth_mm)
         if not task.path.is_seam:
             entry["tool_axis"] = "normal" if tool_axis is None else tool_axis
-        if name not in timed and not task.path.has_feeds:
+        if name not in timed and not task.path.is_programmed:
             if task.process is None:
                 entry.setdefault("time_law", motion["time_law"])
             entry.setdefault("corners", motion["corners"])

@@ -141,13 +141,13 @@ def _times(valid: ValidEntries, document: YamlDocument, name: str) -> Iterator[F
 def needs_surface(task: TaskEntry) -> bool:
     """Whether the tool's axis can come from nothing but the part's surface or the file of the path."""
     turns = ORIENTATION_AXES & set(task.axes)
-    has_walls = task.path.is_seam or task.path.is_edge
+    has_walls = task.path.is_seam or task.path.is_on_part
     return task.tool_axis == "normal" or (task.tool_axis is None and bool(turns) and not has_walls)
 
 
 def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A normal needs a surface; of a file it is known only later whether it brings orientations."""
-    if needs_surface(task) and task.path.project is None and task.path.file_key is None:
+    if needs_surface(task) and task.path.project is None and not (task.path.file_key or task.path.on):
         cure = "give tool_axis a direction"
         if task.relative_to == "part":
             cure = f"add project: +z (or another side), or {cure}"
@@ -202,7 +202,7 @@ def target_findings(valid: ValidEntries, targets: Targets, document: YamlDocumen
 def _axes(task: TaskEntry, path: SampledPath | TimedPath, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A file without orientations that is not projected onto the part has no normals."""
     has_axes = path.axes is not None or path.rotations is not None
-    if has_axes and task.path.is_seam:
+    if has_axes and task.path.is_seam and task.path.outline is None:
         text = f"expected no walls and angles beside {path.source}, which gives the tool's orientation already"
         yield document.finding(("tasks", name, "path"), text)
     if needs_surface(task) and task.path.project is None and not has_axes:

@@ -1,0 +1,182 @@
+"""Outlines of drawings on the part: contours of a DXF file with rapids between them, as the path of a task."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Final, cast
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.files.cell.paths.csv_table import METRES_PER_MM
+from cellplan.files.cell.paths.dxf import DrawingSettings, FlatDrawing, read_drawing, require_dxf
+from cellplan.files.cell.referenced_files import Sources
+from cellplan.files.cell.step_parts import MEGABYTES, remembered
+from cellplan.files.input.files import digest_of_file
+from cellplan.files.input.findings import KeyPath, key_text
+from cellplan.files.schema.partial import ValidEntries
+from cellplan.files.schema.programmed import OutlineEntry
+from cellplan.files.schema.task import TaskEntry
+from cellplan.files.shapes import centred_solid, direction
+from cellplan.geometry.arrays import Array
+from cellplan.geometry.curves.flat_curves import Contour, begun_near
+from cellplan.geometry.curves.laid_contours import SURFACE, Ground, drawing_pose, lay
+from cellplan.geometry.curves.seam_line import SeamAngles, SeamLine, tool_targets
+from cellplan.geometry.projection import projection_onto
+from cellplan.geometry.shapes import Mesh
+from cellplan.geometry.step.outlines import FaceError, LaidOutline, Outline, lay_on_step
+from cellplan.geometry.step.part import StepPart
+from cellplan.guard import Guard, in_child
+from cellplan.model.settings.units import Deg, Mm, in_si
+from cellplan.model.task.task import ProgrammedPath
+
+SAME_POINT: Final = 1e-6  # [m] points that are nearer than this are one
+NO_JUMP: Final = np.deg2rad(0.1)  # [rad] between the tool axes on both sides of a corner
+
+
+def outline_paths(valid: ValidEntries, sources: Sources, part: StepPart | None) -> dict[str, ProgrammedPath]:
+    """Paths of the tasks along outlines, by task; findings about the others. ``part`` is that of a STEP file."""
+    tasks = {name: task for name, task in valid.tasks.items() if task.path.outline is not None}
+    if valid.part is None or (valid.part.step is not None and part is None):
+        return {}  # the part itself says why
+    paths = {}
+    for name, task in tasks.items():
+        where: KeyPath = ("tasks", name, "path")
+        stated = task.path.outline
+        entry = stated if isinstance(stated, OutlineEntry) else OutlineEntry(file=stated or "")
+        place = sources.file(entry.file, (*where, "outline", *(() if isinstance(stated, str) else ("file",))))
+        if place is None:
+            continue
+        try:
+            drawing, sources.inputs[entry.file] = _drawing(place, entry, task.path.layer or "")
+        except InputError as error:
+            sources.errors.append(error)
+            continue
+        try:
+            contours = _chosen(drawing.contours, entry, task)
+            ground = task.path.on or "" if task.path.project is None else direction(task.path.project)
+            outline = Outline(entry.file, contours, ground, entry.at.matrix, entry.chord_mm.si)
+            laid = _laid(outline, valid, sources)
+            if laid is not None:
+                paths[name] = _programmed(laid, entry, task)
+            sources.remarks.append((key_text((*where, "outline")), drawing.remark))
+        except FaceError as error:
+            sources.findings.append(sources.document.finding((*where, "on"), str(error)))
+        except InputError as error:
+            sources.findings.append(sources.document.finding((*where, "outline"), str(error)))
+    return paths
+
+
+def _drawing(place: Path, entry: OutlineEntry, layer: str) -> tuple[FlatDrawing, str]:
+    """Contours of a layer, and the SHA-256 of their file."""
+    require_dxf(entry.file)
+    settings = DrawingSettings(source=entry.file, layer=layer, unit=entry.unit, join=entry.join_mm.si)
+    digest = digest_of_file(place, file=entry.file)
+    guard = Guard(file=entry.file, worker="the DXF reader")
+    return remembered((digest, settings), lambda: in_child(read_drawing, place, settings, guard=guard)), digest
+
+
+def _chosen(contours: Sequence[Contour], entry: OutlineEntry, task: TaskEntry) -> tuple[Contour, ...]:
+    """Contours of a drawing that are run along, each as it is run along."""
+    numbers = entry.contours or range(1, len(contours) + 1)
+    if max(numbers) > len(contours):
+        raise InputError(f"expected contours up to {len(contours)}, as many as the layer has, got {max(numbers)}")
+    chosen = [contours[number - 1] for number in numbers]
+    if task.path.reverse:
+        chosen = [contour.turned_back() for contour in chosen]
+    if entry.start_at_mm is not None:
+        start = np.array(in_si(entry.start_at_mm))
+        chosen = [begun_near(contour, start) if contour.is_closed else contour for contour in chosen]
+    return tuple(chosen)
+
+
+def _laid(outline: Outline, valid: ValidEntries, sources: Sources) -> LaidOutline | None:
+    """An outline on the part; None where the part has a mesh that cannot be read."""
+    step, geometry = (valid.part.step, valid.part.geometry) if valid.part is not None else (None, None)
+    if step is not None:
+        place, digest = sources.file(step.file, ("part", "step", "file")), sources.inputs[step.file]
+        guard = Guard(file=step.file, worker="the STEP reader", megabytes=MEGABYTES)
+        return in_child(lay_on_step, place, step.file, step.shape, digest, outline, guard=guard)
+    if isinstance(outline.ground, str):
+        raise FaceError("expected a part from a STEP file (part.step), or project: +z (or another side)")
+    mesh = None
+    if geometry is not None and geometry.mesh is not None:
+        mesh = sources.mesh(geometry.mesh, geometry.unit, ("part", "geometry", "mesh"))
+    if geometry is None or (geometry.mesh is not None and mesh is None):
+        return None
+    shape, X_PS = centred_solid(geometry, lambda *_: cast("Mesh", mesh))
+    project = projection_onto(shape, X_PS, outline.ground)
+    ground = Ground(
+        project=project, X_PD=drawing_pose(outline.ground, 0.0, outline.X_FD), is_plane=False, name="the part"
+    )
+    return LaidOutline(lay(outline.contours, ground, outline.chord, outline.source), outline.ground)
+
+
+def _programmed(laid: LaidOutline, entry: OutlineEntry, task: TaskEntry) -> ProgrammedPath:
+    """Contours one after the other, with rapids between them over the highest point."""
+    path = task.path
+    angles = SeamAngles(
+        face=SURFACE,
+        work=(path.work_deg or Deg(0.0)).si,
+        travel=(path.push_deg or Deg(0.0)).si - (path.drag_deg or Deg(0.0)).si,
+        standoff=(path.standoff_mm or Mm(0.0)).si,
+    )
+    lines = laid.lines if entry.order == "file" else _by_distance(laid.lines)
+    targets = [_targets_along(line, angles, entry) for line in lines]
+    height = max(float((points @ laid.direction).max()) for points, _ in targets) + entry.lift_mm.si
+    points, axes, rapid = [targets[0][0]], [targets[0][1]], [np.zeros(len(targets[0][0]) - 1, dtype=bool)]
+    for (before, held), (after, next_held) in pairwise(targets):
+        ends = np.stack([before[-1], after[0]])
+        points += [ends + (height - ends @ laid.direction)[:, None] * laid.direction, after]
+        axes += [np.stack([held[-1], next_held[0]]), next_held]
+        rapid += [np.ones(3, dtype=bool), np.zeros(len(after) - 1, dtype=bool)]
+    is_rapid = np.concatenate(rapid)
+    feed = 0.0 if task.process is None else task.process.feed
+    return ProgrammedPath(
+        source=entry.file,
+        points=np.concatenate(points),
+        axes=np.concatenate(axes) if task.tool_axis in {None, "normal"} else None,
+        rotations=None,
+        is_smooth=False,
+        is_closed=False,
+        speeds=np.where(is_rapid, entry.transfer_mm_s.si, feed),
+        is_rapid=is_rapid,
+        rounding=entry.rounding_mm.si,
+        stop_angle=entry.stop_deg.si,
+    )
+
+
+def _by_distance(lines: Sequence[SeamLine]) -> list[SeamLine]:
+    """Lines of which each begins nearer to the end of the one before than all that are left."""
+    left, ordered = list(lines[1:]), [lines[0]]
+    while left:
+        end = ordered[-1].points[-1]
+        ordered.append(left.pop(int(np.argmin([np.linalg.norm(line.points[0] - end) for line in left]))))
+    return ordered
+
+
+def _targets_along(line: SeamLine, angles: SeamAngles, entry: OutlineEntry) -> tuple[Array, Array]:
+    """Tool tips in [m] and unit tool axes into the part along a line, shape (N, 3) each, without points that repeat.
+
+    At a corner that is passed without a stop the tool is held halfway between both sides.
+    """
+    _, axes = tool_targets(line, angles)
+    corners = np.flatnonzero(np.diff(line.behind) == 0.0)
+    turn = np.linalg.norm(line.tangents[corners + 1] - line.tangents[corners], axis=1)
+    jump = np.linalg.norm(axes[corners + 1] - axes[corners], axis=1)
+    sharp = corners[(turn > 2.0 * np.sin(0.5 * entry.stop_deg.si)) & (jump > NO_JUMP)]
+    if len(sharp):
+        x, y, z = line.points[sharp[0]] / METRES_PER_MM
+        degrees = np.rad2deg(2.0 * np.arcsin(0.5 * jump[corners == sharp[0]][0]))
+        raise InputError(
+            f"expected a tool axis without a jump, but at the corner [{x:.3f}, {y:.3f}, {z:.3f}] mm of the part it "
+            f"would turn by {degrees:.3g} deg at once; leave out work_deg, push_deg and drag_deg, or choose a contour "
+            "without corners (outline.contours)"
+        )
+    axes[corners] += axes[corners + 1]
+    axes = np.delete(axes, corners + 1, axis=0)
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    points = np.delete(line.points, corners + 1, axis=0) - angles.standoff * axes
+    far = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME_POINT)
+    far[-2:] = [far[-2] and (far[-1] or len(far) == 2), True]  # the end stays
+    return points[far], axes[far]
