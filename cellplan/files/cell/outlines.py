@@ -42,6 +42,9 @@ def outline_paths(valid: ValidEntries, sources: Sources, part: StepPart | None) 
     paths = {}
     for name, task in tasks.items():
         where: KeyPath = ("tasks", name, "path")
+        if task.process is not None and task.process.has_open_feed:
+            text = "expected a number above 0 in mm/s for an outline, whose feed is not sought"
+            sources.findings.append(sources.document.finding(("tasks", name, "process", "feed_mm_s"), text))
         stated = task.path.outline
         entry = stated if isinstance(stated, OutlineEntry) else OutlineEntry(file=stated or "")
         place = sources.file(entry.file, (*where, "outline", *(() if isinstance(stated, str) else ("file",))))

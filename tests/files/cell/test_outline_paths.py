@@ -226,6 +226,8 @@ def test_a_task_along_an_outline_has_a_process_and_no_times(folder: Path) -> Non
     assert "tasks.cut.process: missing, expected the feed along an outline, such as {feed_mm_s: 20}" in words(
         process, ""
     )
+    open_feed = words("{feed_mm_s: 20}", "{feed_mm_s: greatest}")
+    assert "tasks.cut.process.feed_mm_s: expected a number above 0 in mm/s for an outline" in open_feed
     assert "tasks.cut.process.feed_mm_s: missing" in words("{feed_mm_s: 20}", "{ramp_s: 0.1}")
     assert "tasks.cut.corners: unexpected key, the process has the feed" in words(
         process, f"{process}    corners: stop\n"
