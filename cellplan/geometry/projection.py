@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.geometry.curves.laid_contours import Projected
+from cellplan.geometry.curves.placed_contours import Projected
 from cellplan.geometry.curves.surface_patch import Patch, patches_facing
 from cellplan.geometry.mesh.load import normals_at, ray_hits
 from cellplan.geometry.shapes import Capsule, Mesh, Solid, bounding_sphere

@@ -5,7 +5,7 @@ import pytest
 
 from cellplan.errors import InputError
 from cellplan.geometry.curves.flat_curves import Contour, FlatArc, FlatLine, begun_near, bulged
-from cellplan.geometry.curves.laid_contours import AXIS_STEP, SURFACE, Ground, drawing_pose, lay
+from cellplan.geometry.curves.placed_contours import AXIS_STEP, SURFACE, Ground, drawing_pose, place_contours
 from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.projection import projection_onto
@@ -26,11 +26,11 @@ def polygon(*corners: tuple[float, float]) -> Contour:
     return Contour(tuple(FlatLine(first=a, last=b) for a, b in zip(points, np.roll(points, -1, 0), strict=True)), True)
 
 
-def laid(contour: Contour, shape: Solid, direction: np.ndarray = UP, X_FD: np.ndarray | None = None) -> SeamLine:
+def placed(contour: Contour, shape: Solid, direction: np.ndarray = UP, X_FD: np.ndarray | None = None) -> SeamLine:
     X_PD = drawing_pose(direction, 0.0, np.eye(4) if X_FD is None else X_FD)
     project = projection_onto(shape, np.eye(4), direction)
     ground = Ground(project=project, X_PD=X_PD, is_plane=False, name="the part")
-    (line,) = lay([contour], ground, CHORD, "logo.dxf")
+    (line,) = place_contours([contour], ground, CHORD, "logo.dxf")
     return line
 
 
@@ -43,7 +43,7 @@ def deviation(line: SeamLine, curve) -> float:
 
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (0.03, -0.02)])
 def test_a_circle_on_a_sphere_is_within_the_chord_and_has_its_normals(centre: tuple[float, float]) -> None:
-    line = laid(circle(0.03, centre), Sphere(0.1))
+    line = placed(circle(0.03, centre), Sphere(0.1))
 
     np.testing.assert_allclose(np.linalg.norm(line.points, axis=1), 0.1, rtol=1e-12)
     np.testing.assert_allclose(line.walls[SURFACE], line.points / 0.1, atol=1e-12)
@@ -66,7 +66,7 @@ def test_a_line_across_a_cylinder_is_an_ellipse_of_its_section() -> None:
     contour = Contour((FlatLine(first=np.array([-0.03, -0.03]), last=np.array([0.03, 0.03])),), False)
     X_FD = pose((0.0, 0.0, 0.0), (0.0, 0.0, np.deg2rad(15.0)))
 
-    line = laid(contour, Cylinder(0.05, 0.2), np.array([1.0, 0.0, 0.0]), X_FD)  # seen along x: the x axis is +y
+    line = placed(contour, Cylinder(0.05, 0.2), np.array([1.0, 0.0, 0.0]), X_FD)  # seen along x: the x axis is +y
 
     _, y, z = line.points.T
     np.testing.assert_allclose(z, np.tan(np.deg2rad(60.0)) * y, atol=1e-12)
@@ -77,7 +77,7 @@ def test_a_line_across_a_cylinder_is_an_ellipse_of_its_section() -> None:
 
 
 def test_a_mesh_gives_what_its_solid_gives_within_its_facets() -> None:
-    exact, meshed = (laid(circle(0.03), shape) for shape in (Sphere(0.1), tessellate(Sphere(0.1), 96)))
+    exact, meshed = (placed(circle(0.03), shape) for shape in (Sphere(0.1), tessellate(Sphere(0.1), 96)))
 
     height = np.sqrt(0.1**2 - 0.03**2)
     np.testing.assert_allclose(exact.points[:, 2], height, rtol=1e-12)
@@ -87,7 +87,7 @@ def test_a_mesh_gives_what_its_solid_gives_within_its_facets() -> None:
 
 
 def test_straight_sides_on_a_box_keep_their_corners_twice() -> None:
-    line = laid(polygon((-0.02, -0.02), (0.02, -0.02), (0.02, 0.02)), Box((0.1, 0.1, 0.04)))
+    line = placed(polygon((-0.02, -0.02), (0.02, -0.02), (0.02, 0.02)), Box((0.1, 0.1, 0.04)))
 
     corners = np.flatnonzero(np.diff(line.behind) == 0.0)
     np.testing.assert_allclose(line.points[corners], [[0.02, -0.02, 0.02], [0.02, 0.02, 0.02]])
@@ -99,11 +99,11 @@ def test_a_smooth_junction_is_no_corner() -> None:
     half = bulged(np.array([0.02, -0.01]), np.array([0.02, 0.01]), 1.0)
     contour = Contour((FlatLine(first=np.array([-0.02, -0.01]), last=np.array([0.02, -0.01])), half), False)
 
-    assert not np.any(np.diff(laid(contour, Box((0.1, 0.1, 0.04))).behind) == 0.0)
+    assert not np.any(np.diff(placed(contour, Box((0.1, 0.1, 0.04))).behind) == 0.0)
 
 
 def test_from_below_a_drawing_is_seen_the_right_way_round() -> None:
-    line = laid(circle(0.02), Box((0.1, 0.1, 0.04)), -UP)
+    line = placed(circle(0.02), Box((0.1, 0.1, 0.04)), -UP)
 
     np.testing.assert_allclose(line.points[0], [0.02, 0.0, -0.02])
     left = np.cross(line.walls[SURFACE], line.tangents)
@@ -124,7 +124,7 @@ def test_from_below_a_drawing_is_seen_the_right_way_round() -> None:
 )
 def test_what_leaves_the_part_is_refused_with_its_place(contour: Contour, shape: Solid, words: str) -> None:
     with pytest.raises(InputError) as refused:
-        laid(contour, shape)
+        placed(contour, shape)
     assert words in str(refused.value)
 
 
@@ -133,7 +133,7 @@ def test_a_contour_over_an_edge_is_refused_near_the_edge() -> None:
     tilted = np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0)  # a box seen over its edge
 
     with pytest.raises(InputError, match=r"over an edge of the part"):
-        laid(contour, Box((0.1, 0.1, 0.1)), tilted)
+        placed(contour, Box((0.1, 0.1, 0.1)), tilted)
 
 
 def test_a_closed_contour_begins_where_it_is_nearest_to_a_point() -> None:

@@ -20,11 +20,11 @@ from cellplan.files.schema.task import TaskEntry
 from cellplan.files.shapes import centred_solid, direction
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.curves.flat_curves import Contour, begun_near
-from cellplan.geometry.curves.laid_contours import SURFACE, Ground, drawing_pose, lay
+from cellplan.geometry.curves.placed_contours import SURFACE, Ground, drawing_pose, place_contours
 from cellplan.geometry.curves.seam_line import SeamAngles, SeamLine, tool_targets
 from cellplan.geometry.projection import projection_onto
 from cellplan.geometry.shapes import Mesh
-from cellplan.geometry.step.outlines import FaceError, LaidOutline, Outline, lay_on_step
+from cellplan.geometry.step.outlines import FaceError, Outline, PlacedOutline, place_on_step
 from cellplan.geometry.step.part import StepPart
 from cellplan.guard import Guard, in_child
 from cellplan.model.settings.units import Deg, Mm, in_si
@@ -59,9 +59,9 @@ def outline_paths(valid: ValidEntries, sources: Sources, part: StepPart | None) 
             contours = _chosen(drawing.contours, entry, task)
             ground = task.path.on or "" if task.path.project is None else direction(task.path.project)
             outline = Outline(entry.file, contours, ground, entry.at.matrix, entry.chord_mm.si)
-            laid = _laid(outline, valid, sources)
-            if laid is not None:
-                paths[name] = _programmed(laid, entry, task)
+            placed = _placed(outline, valid, sources)
+            if placed is not None:
+                paths[name] = _programmed(placed, entry, task)
             sources.remarks.append((key_text((*where, "outline")), drawing.remark))
         except FaceError as error:
             sources.findings.append(sources.document.finding((*where, "on"), str(error)))
@@ -93,13 +93,13 @@ def _chosen(contours: Sequence[Contour], entry: OutlineEntry, task: TaskEntry) -
     return tuple(chosen)
 
 
-def _laid(outline: Outline, valid: ValidEntries, sources: Sources) -> LaidOutline | None:
+def _placed(outline: Outline, valid: ValidEntries, sources: Sources) -> PlacedOutline | None:
     """An outline on the part; None where the part has a mesh that cannot be read."""
     step, geometry = (valid.part.step, valid.part.geometry) if valid.part is not None else (None, None)
     if step is not None:
         place, digest = sources.file(step.file, ("part", "step", "file")), sources.inputs[step.file]
         guard = Guard(file=step.file, worker="the STEP reader", megabytes=MEGABYTES)
-        return in_child(lay_on_step, place, step.file, step.shape, digest, outline, guard=guard)
+        return in_child(place_on_step, place, step.file, step.shape, digest, outline, guard=guard)
     if isinstance(outline.ground, str):
         raise FaceError("expected a part from a STEP file (part.step), or project: +z (or another side)")
     mesh = None
@@ -112,10 +112,10 @@ def _laid(outline: Outline, valid: ValidEntries, sources: Sources) -> LaidOutlin
     ground = Ground(
         project=project, X_PD=drawing_pose(outline.ground, 0.0, outline.X_FD), is_plane=False, name="the part"
     )
-    return LaidOutline(lay(outline.contours, ground, outline.chord, outline.source), outline.ground)
+    return PlacedOutline(place_contours(outline.contours, ground, outline.chord, outline.source), outline.ground)
 
 
-def _programmed(laid: LaidOutline, entry: OutlineEntry, task: TaskEntry) -> ProgrammedPath:
+def _programmed(placed: PlacedOutline, entry: OutlineEntry, task: TaskEntry) -> ProgrammedPath:
     """Contours one after the other, with rapids between them over the highest point."""
     path = task.path
     angles = SeamAngles(
@@ -124,13 +124,13 @@ def _programmed(laid: LaidOutline, entry: OutlineEntry, task: TaskEntry) -> Prog
         travel=(path.push_deg or Deg(0.0)).si - (path.drag_deg or Deg(0.0)).si,
         standoff=(path.standoff_mm or Mm(0.0)).si,
     )
-    lines = laid.lines if entry.order == "file" else _by_distance(laid.lines)
+    lines = placed.lines if entry.order == "file" else _by_distance(placed.lines)
     targets = [_targets_along(line, angles, entry) for line in lines]
-    height = max(float((points @ laid.direction).max()) for points, _ in targets) + entry.lift_mm.si
+    height = max(float((points @ placed.direction).max()) for points, _ in targets) + entry.lift_mm.si
     points, axes, rapid = [targets[0][0]], [targets[0][1]], [np.zeros(len(targets[0][0]) - 1, dtype=bool)]
     for (before, held), (after, next_held) in pairwise(targets):
         ends = np.stack([before[-1], after[0]])
-        points += [ends + (height - ends @ laid.direction)[:, None] * laid.direction, after]
+        points += [ends + (height - ends @ placed.direction)[:, None] * placed.direction, after]
         axes += [np.stack([held[-1], next_held[0]]), next_held]
         rapid += [np.ones(3, dtype=bool), np.zeros(len(after) - 1, dtype=bool)]
     is_rapid = np.concatenate(rapid)

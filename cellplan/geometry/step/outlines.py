@@ -10,7 +10,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.curves.flat_curves import Contour
-from cellplan.geometry.curves.laid_contours import Ground, Projected, drawing_pose, lay
+from cellplan.geometry.curves.placed_contours import Ground, Projected, drawing_pose, place_contours
 from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.geometry.step.drawing import names_of_faces
 from cellplan.geometry.step.kernel import Face, Solid, first_hits
@@ -33,28 +33,28 @@ class Outline(NamedTuple):
     chord: float  # distance in [m] within which sides follow them
 
 
-class LaidOutline(NamedTuple):
+class PlacedOutline(NamedTuple):
     """Contours on a part, and the direction out of it from which they are seen, shape (3,)."""
 
     lines: list[SeamLine]
     direction: Array
 
 
-def lay_on_step(path: Path, file: str, shape: str | None, digest: str, outline: Outline) -> LaidOutline:
+def place_on_step(path: Path, file: str, shape: str | None, digest: str, outline: Outline) -> PlacedOutline:
     """An outline on the solids of a STEP file, or on those of a shape of that name, in the frame of the file.
 
     ``digest`` is that of the file: solids that were read last are not read again.
 
     Raises:
         FaceError: There is no plane face of that name.
-        InputError: The file cannot be read, or the outline does not lie on it; see `lay`.
+        InputError: The file cannot be read, or the outline does not lie on it; see `place_contours`.
     """
     solids = _solids(path, file, shape, digest)
     if isinstance(outline.ground, str):
         ground = _on_face(_plane_face(solids, outline.ground), outline)
     else:
         ground = _on_solids(solids, outline.ground, outline)
-    return LaidOutline(lay(outline.contours, ground, outline.chord, outline.source), ground.X_PD[:3, 2])
+    return PlacedOutline(place_contours(outline.contours, ground, outline.chord, outline.source), ground.X_PD[:3, 2])
 
 
 @lru_cache(maxsize=1)

@@ -45,13 +45,13 @@ def path_fields(name: str, document: CellDocument, read_targets: TargetReader) -
     task = document.tasks[name]
     entry = task.path
     path = _path(name, entry, read_targets)
-    is_laid = entry.outline is not None  # projected and held to the part already
+    is_placed = entry.outline is not None  # projected and held to the part already
     return PathFields(
         path=path,
-        seam=None if is_laid else _seam(entry, tuple(path.walls) if isinstance(path, SeamLine) else entry.wall_names),
-        stretch=None if is_laid else _stretch(entry),
+        seam=None if is_placed else _seam(entry, tuple(path.walls) if isinstance(path, SeamLine) else entry.wall_names),
+        stretch=None if is_placed else _stretch(entry),
         weave=None if entry.weave is None or is_woven_by_controller(task, document) else _weave(entry.weave, task),
-        project=None if entry.project is None or is_laid else direction(entry.project),
+        project=None if entry.project is None or is_placed else direction(entry.project),
         plane_offset=(entry.offset_mm or Mm(0.0)).si,
     )
 

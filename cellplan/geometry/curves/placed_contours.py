@@ -1,4 +1,4 @@
-"""Contours of a drawing laid on a surface: points within a chord of it, with travel and normal at each."""
+"""Contours of a drawing placed on a surface: points within a chord of it, with travel and normal at each."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ AXIS_STEP: Final = np.deg2rad(2.0)  # [rad] between normals of neighbouring poin
 FLATTEST: Final = np.sin(np.deg2rad(1.0))  # [-] a surface that is seen at a flatter angle stretches the contour
 SMOOTH: Final = 1e-6  # [rad] curves that turn by less where they meet run on without a corner
 ALONG_X: Final = np.cos(np.deg2rad(0.1))  # [-] of a direction that leaves +x no part along the plane of a drawing
-SURFACE: Final = "surface"  # the wall beside a laid contour
+SURFACE: Final = "surface"  # the wall beside a placed contour
 
 
 class Projected(NamedTuple):
@@ -34,7 +34,7 @@ class Projected(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Ground:
-    """What contours are laid on.
+    """What contours are placed on.
 
     Attributes:
         project: Projection of points in P, shape (N, 3), along the z axis of ``X_PD``.
@@ -70,7 +70,7 @@ class _Samples:
     t: Array  # parameters, shape (N,)
     flat: Array  # points in the plane of the drawing in [m], shape (N, 2)
     on: Projected  # points on the surface
-    is_open: Flags  # whether the side behind each point but the last has to be looked at, shape (N - 1,)
+    is_open: Flags  # whether the side behind each point but the last has to be examined, shape (N - 1,)
 
     def refined(self, t: Array, flat: Array, on: Projected, is_off: Flags) -> None:
         """Take those points in the middle of open sides that are off the side."""
@@ -82,7 +82,7 @@ class _Samples:
         self.is_open[np.concatenate([places, places + 1])] = True
 
 
-def lay(contours: Sequence[Contour], ground: Ground, chord: float, source: str) -> list[SeamLine]:
+def place_contours(contours: Sequence[Contour], ground: Ground, chord: float, source: str) -> list[SeamLine]:
     """Contours on a surface: each as a line with the one wall ``surface``; a corner stands twice.
 
     Sides between neighbouring points are within ``chord``, in [m], of the contour on the surface.
