@@ -1,4 +1,4 @@
-"""Outlines of solids from above."""
+"""Outlines of solids: from above, and how far they reach in some directions."""
 
 from typing import Final
 
@@ -14,6 +14,7 @@ ALL_ROUND: Final = np.concatenate(
     [np.cos(tilt) * AROUND[::2] + np.sin(tilt) * np.array([0.0, 0.0, 1.0]) for tilt in np.radians((-60, -20, 20, 60))]
 )  # directions all round a body, of which the corners of a mesh are sought once
 FEW_SAMPLES: Final = 8  # [-] poses for which a mesh is taken with all its corners
+MOST_DIRECTIONS: Final = 1000  # along which the corners of a mesh are compared at once
 FACING: Final = 1e-9  # [-] a direction this near to the normal of a face is the normal: rounding
 
 
@@ -39,6 +40,14 @@ def swept_outlines(shape: Solid, R: Array, p: Array) -> Array:
     reach = np.einsum("kci,ci->kc", at, AROUND[:, :2])
     is_later = reach[1:] > reach[:-1]
     return np.where(is_later[..., None], at[1:], at[:-1])
+
+
+def reaches(shape: Solid, n: Array) -> Array:
+    """How far a solid reaches from its origin along unit directions in its frame, shape (N, 3), in [m], shape (N,)."""
+    if not isinstance(shape, Mesh):
+        return np.asarray(np.sum(_farthest(shape, n) * n, axis=1))
+    parts = np.array_split(n, -(-len(n) // MOST_DIRECTIONS))
+    return np.concatenate([(part @ shape.vertices.T).max(axis=1) for part in parts])
 
 
 def _farthest(shape: Box | Cylinder | Capsule | Sphere, n: Array) -> Array:

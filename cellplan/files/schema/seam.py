@@ -115,7 +115,9 @@ class PathEntry(PathShapeEntry):
         None, "Distance of the tool tip from the path, against the tool's own axis; 0 when absent."
     )
     rod_from_walls_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_MM)] | None = setting(
-        None, "Least distance of the rod of the tool from the walls, as planes through the path; 0 when absent."
+        None,
+        "Least distance of the rod of the tool from the walls, as planes through the path, 0 when absent; of a tool "
+        "without a rod that of all its solids, which are not judged when absent.",
     )
     side_mm: Shift | None = setting(
         None,

@@ -24,12 +24,13 @@ class Seam:
         walls: Outward unit normals in P by name, shape (3,) each, or where a wall is; none for a seam line, which has
             its own.
         angles: How the tool is held.
-        rod_clearance: Least distance in [m] of a rod from the walls.
+        rod_clearance: Least distance in [m] of a rod from the walls, or of a whole tool without a rod; None for one
+            that touches them at most, of a rod only.
     """
 
     walls: Mapping[str, Array | WallPlace]
     angles: SeamAngles
-    rod_clearance: float = 0.0
+    rod_clearance: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

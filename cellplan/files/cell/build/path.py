@@ -127,7 +127,7 @@ def _seam(entry: PathEntry, names: tuple[str, ...]) -> Seam | None:
             out=(entry.out_mm or Mm(0.0)).si,
             toward=entry.toward,
         ),
-        rod_clearance=(entry.rod_from_walls_mm or Mm(0.0)).si,
+        rod_clearance=si_or_none(entry.rod_from_walls_mm),
     )
 
 
