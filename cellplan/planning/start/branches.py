@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.transforms import Array, inverse
+from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_exp
 from cellplan.model.cell.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.task.clocked_path import ClockedPath
 from cellplan.model.task.task import Frame, Task
-from cellplan.planning.start.given import is_off, part_pose, tool_distance
+from cellplan.planning.start.given import is_off, leaning_angle, part_pose, tool_distance
 from cellplan.planning.start.inverse_kinematics import (
     constrained_rank,
     finite_limits,
@@ -35,6 +35,8 @@ HOLDER_RANGE: Final = 0.7  # share of each joint range that they are drawn from,
 TRIED_ALONE: Final = 8  # branches of each operator that are tried out without the other operators
 BRANCHES: Final = 4  # the best of these, which are combined
 ALL_AXES: Final = 6  # [-] components of a grasp that leaves nothing free
+LEAN: Final = 0.5  # [-] of the cone by which an axis leans at a start that is not reached with the desired one
+SIDES: Final = np.array([[np.cos(a), np.sin(a), 0.0] for a in np.pi / 4.0 * np.arange(8)])  # to which it leans then
 COMFORTABLE: Final = 0.1  # smallest singular value above which more manipulability is worth no more
 
 Branch = tuple[float, Array]  # what a configuration is worth, and the configuration, shape (n,)
@@ -217,7 +219,8 @@ def _scored_branches(
 ) -> list[Branch]:
     """Configurations that bring a tool to the start of its task or to its grasp, by joint margin times manipulability.
 
-    Where two are worth the same, the joints with the next smaller margins decide, and then the configuration itself.
+    A tool whose axis may lean does so where no configuration has the desired axis. Where two are worth the same, the
+    joints with the next smaller margins decide, and then the configuration itself.
     """
     X_WP = part_pose(search.cell, holder_configuration) if relation.relative_to is Frame.PART else np.eye(4)
     if X_WP is None:
@@ -227,6 +230,11 @@ def _scored_branches(
     seeds = search.random_configurations(robot, SEEDS_PER_HOLDER if search.is_holder_open else SEEDS)
     configurations = reaching_configurations(chain, relation, X_PT, X_WP=X_WP, seeds=seeds)
     q = within_limits(robot.model, configurations)
+    lean = LEAN * leaning_angle(search.cell, relation)
+    if lean and not len(q):
+        leaned = X_PT @ pose_from(rotation_exp(lean * SIDES), np.zeros((len(SIDES), 3)))
+        arrived = [reaching_configurations(chain, relation, X, X_WP=X_WP, seeds=seeds) for X in leaned]
+        q = within_limits(robot.model, np.concatenate(arrived))
     if not len(q):
         search.failures.unreached(
             robot.name, MissedGoal(relation=relation, X_PT=X_PT, X_WP=X_WP), beyond=configurations

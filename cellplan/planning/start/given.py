@@ -17,6 +17,7 @@ from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.cell.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.cell.doubts import doubt_about_limits
 from cellplan.model.robot.robot import Joint
+from cellplan.model.solver import METHODS
 from cellplan.model.task.task import Frame, Task
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.tracking.cooperation_jacobian import pose_errors
@@ -137,10 +138,15 @@ def off_words(cell: Cell, relation: Relation, off: tuple[float, float], *, at_be
 
 
 def _allowed(cell: Cell, relation: Relation) -> tuple[float, float]:
-    """Largest distance in [m] and angle in [rad] of a given start from its task or grasp."""
+    """Largest distance in [m] and angle in [rad] of a given start from its task or grasp, leaning included."""
     if isinstance(relation, Grasp):
         return cell.checks.closure_mm.si, cell.checks.closure_deg.si
-    return relation.tolerance.position_mm.si, relation.tolerance.orientation_deg.si
+    return relation.tolerance.position_mm.si, relation.tolerance.orientation_deg.si + leaning_angle(cell, relation)
+
+
+def leaning_angle(cell: Cell, relation: Relation) -> float:
+    """Angle in [rad] by which the axis of a tool may lean at its start; 0 where the method keeps it."""
+    return relation.tilt if METHODS[cell.solver.method].lets_axes_lean else 0.0
 
 
 def _outside(cell: Cell, robot: Robot) -> list[InputError]:
