@@ -146,7 +146,8 @@ def _allowed(cell: Cell, relation: Relation) -> tuple[float, float]:
 
 def leaning_angle(cell: Cell, relation: Relation) -> float:
     """Angle in [rad] by which the axis of a tool may lean at its start; 0 where the method keeps it."""
-    return relation.tilt if METHODS[cell.solver.method].lets_axes_lean else 0.0
+    traits = METHODS.get(cell.solver.method)  # None of a method that users add
+    return relation.tilt if traits is not None and traits.lets_axes_lean else 0.0
 
 
 def _outside(cell: Cell, robot: Robot) -> list[InputError]:
