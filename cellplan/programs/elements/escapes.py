@@ -115,7 +115,10 @@ class EscapeForm:
             yield self.meet.format(program=name)
 
     def before(self, program: EscapeProgram) -> list[str]:
-        """Statements before anything moves: processes end; a robot by itself has one step, and keeps no register."""
+        """Statements before anything moves: processes end; a robot by itself has one step, and counts in no register.
+
+        Only where its main program counts motions it does.
+        """
         frame, robot, process = program.frame, program.robot, self.events(program.frame, program.robot).form
         tasks = [task.name for task in frame.cell.tasks if task.robot == robot]
         off = list[str]()
@@ -123,7 +126,7 @@ class EscapeForm:
             lines = (process.lines(False, task, ahead=ahead) for ahead in (False, True) for task in tasks)
             off = list(dict.fromkeys(chain.from_iterable(lines)))
         if not handshake_steps(frame, robot):
-            return [*off, self.set_register(program, program.steps[0].number)]
+            return off if self.counted[0] else [*off, self.set_register(program, program.steps[0].number)]
         return [*off, *self.lines(frame, robot, [lowering_step(frame, robot)])]
 
     def set_register(self, program: EscapeProgram, number: int) -> str:
@@ -326,10 +329,11 @@ def _pattern(statement: str) -> re.Pattern[str]:
 def _with_steps(form: EscapeForm, frame: ExportFrame, files: Mapping[str, str]) -> dict[str, str]:
     """Files of main programs with their step registers: 0 before the first motion, then the number of each mark.
 
-    In paced programs it is counted up, as routines of seams do not stand in the order in which they are called.
+    In paced programs it is counted up, as routines of seams do not stand in the order in which they are called. A robot
+    by itself has a mark at its first row where motions are counted, and no register else.
     """
     result = dict(files)
-    for robot in frame.robots if len(frame.cell.robots) > 1 else ():
+    for robot in frame.robots if len(frame.cell.robots) > 1 or form.counted[0] else ():
         name, number, sources = register_of(frame, robot), 0, form.sources(frame, robot)
         for path in sorted(path for path in files if re.fullmatch(sources, path)):
             lines, texts = list[str](), files[path].split("\n")
@@ -352,6 +356,9 @@ def _with_steps(form: EscapeForm, frame: ExportFrame, files: Mapping[str, str]) 
 def _places(form: EscapeForm, frame: ExportFrame, robot: str, lines: Sequence[str]) -> dict[int, int]:
     """Lines behind which a statement is added: 0 where a program begins, 1 at a mark, 2 where data are declared."""
     steps = handshake_steps(frame, robot)
+    if not steps:
+        motion = next((place for place, line in enumerate(lines) if line.startswith(form.counted[0])), 0)
+        return {motion - 1: 0, motion: 1}
     whole, half = (form.lines(frame, robot, part) for part in (steps, steps[: len(steps) // 2]))
     first, places, line = form.lines(frame, robot, [lowering_step(frame, robot)]), dict[int, int](), 0
     while line < len(lines):

@@ -19,7 +19,7 @@ from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import Choice, exported_robots, refuse_unknown_robots
 from cellplan.programs.export.exporters import EXPORTERS, exporter_of, refuse_choice
 from cellplan.programs.promises.promises import require_promise
-from cellplan.programs.promises.run_programs import holders_rest, run_programs
+from cellplan.programs.promises.run_programs import holders_rest, program_names, run_programs
 from cellplan.programs.promises.stations import stations
 from cellplan.programs.rows.resample import lead_time
 
@@ -133,7 +133,7 @@ def frame_of(run: AnyRun, dialect: Dialect, robots: Sequence[str], promise: Prom
     frame = ExportFrame(
         cell=run.cell,
         robots=tuple(robots),
-        programs=tuple(program.name for program in run_programs(run)),
+        programs=program_names(run),
         promise=promise,
         moves=choice.moves,
         split=choice.split,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from cellplan.model.task.clocked_path import are_within
 from cellplan.model.task.task import Frame
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.programs.elements.joints import unit_of
+from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.runs.plan.program import STILL_TOL
 
 
@@ -67,6 +69,15 @@ def run_programs(run: AnyRun) -> tuple[RunProgram, ...]:
         )
         for piece in motion.pieces
     )
+
+
+def program_names(run: AnyRun) -> tuple[str | None, ...]:
+    """Names of the programs of a run, or of those that a cell demands, in their order; None for the only one."""
+    if not isinstance(run, UnsolvedRun):
+        return tuple(program.name for program in run_programs(run))
+    phases = DemandedProgram.of(run.cell).plan.phases
+    pieces = [[*piece] for in_program, piece in groupby(phases, key=lambda phase: phase.in_program) if in_program]
+    return tuple(piece[0].label if len(piece) == 1 else None for piece in pieces)
 
 
 def spoilt_by_another_order(cell: Cell, program: RunProgram) -> Iterator[str]:

@@ -165,14 +165,46 @@ def test_a_robot_goes_back_from_the_row_that_is_counted_and_from_nowhere_else(es
         assert [*motions(files, "BETA_ESC", register, place(escape.rows[0]))] == ["halt"]
 
 
+def test_the_job_of_one_robot_counts_from_its_first_row(job: ExportJob) -> None:
+    robot = job.frame.cell.robots[0]
+    cell = replace(job.frame.cell, robots=(robot,), controllers={"box_alpha": ControllerEntry(kind="yaskawa")})
+    frame = replace(job.frame, cell=cell, robots=(ROBOT,))
+    rows = replace(job.programs[0].robots[ROBOT], marks=())
+    alone = ExportJob(frame=frame, programs=(ProgramRows(name=None, robots={ROBOT: rows}),))
+    dialect = with_register(INFORM, INFORM_ESCAPE)
+    files = dialect.render(alone)
+    (read,) = dialect.read(frame, files)
+    statements = next(iter(files.values())).partition("NOP\r\n")[2].split("\r\n")
+    counted = [
+        re.sub("(MOVJ|SET D081 .*|INC D081).*", r"\1", line) for line in statements if line[0:1] not in ("'", "")
+    ]
+    program = EscapeProgram(
+        frame=frame,
+        robot=ROBOT,
+        notes=(),
+        rows=read.robots[ROBOT].q,
+        homeward=read.robots[ROBOT].q[:1],
+        steps=(EscapeStep(1, 1, COUNT, "", ((1, 1),)),),
+    )
+    jobs, tool = INFORM_ESCAPE.render(program), 1000.0 * tip(robot, program.rows[4])[:3, 3]
+
+    assert counted == ["SET D081 0", "MOVJ", "SET D081 1000", *["INC D081", "MOVJ"] * (COUNT - 1), "END"]
+    assert read_escape(INFORM_ESCAPE, program, jobs).steps == program.steps
+    back = [*motions(jobs, "ALPHA_ESC", 1004, tool)]  # it comes to the fifth row, where the motion to it ends
+    assert len(back) == 5
+    np.testing.assert_allclose(
+        [[float(it) for it in text.split(",")][:3] for text in back],
+        [1000.0 * tip(robot, program.rows[row])[:3, 3] for row in (3, 2, 1, 0, 0)],
+        atol=2e-3,
+    )
+    for register in (0, 999, 1000 + COUNT, 2000):
+        assert [*motions(jobs, "ALPHA_ESC", register, tool)] == ["halt"]
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        (
-            {"promise": Promise.PACED},
-            "expected motions of joints between marks of several robots with inform, got l",
-        ),
-        ({"robots": 1}, "expected motions of joints between marks of several robots with inform, got one robot"),
+        ({"promise": Promise.PACED}, "expected motions of joints with inform, got lines: write joints"),
         ({"step_register": "97"}, "expected the number of a variable D, 0 to 96, got '097'"),
         ({"step_register": "N_STEP"}, "expected the number of a variable D, 0 to 96, got 'N_STEP'"),
         ({"name": "a" * 28}, "expected a name of at most 27 characters for --escape"),
@@ -184,8 +216,7 @@ def test_what_no_job_counts_is_refused(job: ExportJob, changes: dict[str, object
     if "step_register" in changes:
         robot = replace(robot, control=robot.control.model_copy(update=changes))
     name = str(changes.get("name", robot.name))
-    robots = (replace(robot, name=name), other)[: int(changes.get("robots", 2))]  # type: ignore[call-overload]
-    cell = replace(frame.cell, robots=robots)
+    cell = replace(frame.cell, robots=(replace(robot, name=name), other))
     changed = replace(frame, cell=cell, robots=(name,), promise=changes.get("promise", frame.promise))  # type: ignore[arg-type]
 
     findings = refusals(*with_register(INFORM, INFORM_ESCAPE).demands(changed, int))

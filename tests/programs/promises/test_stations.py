@@ -11,14 +11,17 @@ from cellplan.errors import InputError
 from cellplan.files.run.stored import read_stored_run
 from cellplan.geometry.transforms import Array, inverse, pose
 from cellplan.model.cell.cell import Cell, Mode
-from cellplan.model.report.exported import Moves
+from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import ReadRun, UnsolvedRun
 from cellplan.model.settings.controllers import ControllerEntry, KindName, RobotControlEntry
 from cellplan.model.task.task import Frame
 from cellplan.programs.dialects import DIALECTS
+from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.frames import require_frame_numbers
 from cellplan.programs.export.choice import Choice
+from cellplan.programs.export.exporters import exporter_of
 from cellplan.programs.export.refusals import refuse_unfit
+from cellplan.programs.promises.run_programs import program_names
 from cellplan.programs.promises.stations import stations
 from cellplan.runs.gate.open_gate import read_run
 from cellplan.runs.gate.stored_cell import load_stored_cell
@@ -175,6 +178,17 @@ def test_a_cell_that_was_not_solved_has_the_same_frames_where_the_part_rests(in_
 
 def test_a_cell_that_was_not_solved_has_no_frames_where_the_part_moves(moving: ReadRun) -> None:
     assert stations(UnsolvedRun(cell=moving.cell)) == {}
+
+
+def test_a_cell_demands_the_programs_that_its_run_has(in_turn: ReadRun, moving: ReadRun) -> None:
+    """Step registers belong to one program, which is known before any row is read."""
+    for run in (in_turn, moving):
+        assert program_names(UnsolvedRun(cell=run.cell)) == program_names(run)
+    choice = Choice(steps=True, promise=Promise.SEQUENCE_ONLY)
+    dialect = exporter_of("krl", choice)
+    assert isinstance(dialect, Dialect)
+
+    refuse_unfit(in_turn, dialect, choice)
 
 
 def test_moves_in_which_a_part_is_taken_are_no_work(cells: Path) -> None:

@@ -152,9 +152,8 @@ def _name(frame: ExportFrame, robot: str) -> str:
 def _require(frame: ExportFrame, robot: str) -> None:
     """Refuse what no job counts, a register that has no such number, and names to which nothing can be added."""
     register, name = register_of(frame, robot), _name(frame, robot)
-    if frame.promise is Promise.PACED or len(frame.cell.robots) == 1:
-        got = "lines: write joints (--moves joints)" if frame.promise is Promise.PACED else "one robot"
-        raise InputError(f"--escape: expected motions of joints between marks of several robots with inform, got {got}")
+    if frame.promise is Promise.PACED:
+        raise InputError("--escape: expected motions of joints with inform, got lines: write joints (--moves joints)")
     if not re.fullmatch(r"[0-9]{1,3}", register) or int(register) > LAST:
         key = f"robots.{robot}.controller.step_register"
         raise InputError(f"{key}: expected the number of a variable D, 0 to {LAST}, got '{register}'")
