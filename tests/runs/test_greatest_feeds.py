@@ -184,3 +184,44 @@ def test_either_a_time_or_a_length_of_ramps(tmp_path: Path) -> None:
         cell.with_values({"tasks.ring.process.ramp_s": 0.1, "tasks.ring.process.ramp_mm": 5})
     with pytest.raises(InputError, match=r"process\.ramp_mm: expected ramps that leave the feed of 60 mm/s some of"):
         planned(cell.with_values({"tasks.ring.process.ramp_mm": 95}))
+
+
+def run_in(folder: Path, **changes: object) -> Cell:
+    """The ring of the top arm with its runs, on which it comes to its feed and to rest."""
+    text = approached().replace("process: {feed_mm_s: 60}", "process: {feed_mm_s: 60, run_in_mm: 20, run_out_mm: 15}")
+    text = re.sub(r"start_deg: \[2\.3276.*\]", "start_deg: auto", text).replace("approach_mm: 60", "approach_mm: 5")
+    return cell_of(folder, text).with_values({f"tasks.ring.{key}": value for key, value in changes.items()})
+
+
+@pytest.mark.slow
+def test_the_feed_holds_all_along_the_work_where_the_tool_runs_in_and_out(tmp_path: Path) -> None:
+    (run,) = planned(run_in(tmp_path)).runs
+    ring = run.schedule.tasks[2]
+    ((begin, end),) = ring.process_on
+    inside = (run.schedule.times >= begin) & (run.schedule.times <= end)
+
+    speeds = np.diff(ring.travelled[inside]) / np.diff(run.schedule.times[inside])
+
+    assert np.allclose(speeds, 0.06, rtol=1e-3)
+    assert end - begin == pytest.approx(2.0 * np.pi * 0.03 / 0.06)
+    assert ring.length == pytest.approx(2.0 * np.pi * 0.03 + 0.035)
+    (answer,) = [it for it in run.report.greatest_feeds if it.task == "ring"]
+    assert answer.travelled[0] == pytest.approx(-0.02)  # places count from the start of the work
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"process.on_delay_s": 1}, "process.on_delay_s: unexpected key beside run_in_mm or run_out_mm"),
+        ({"process.ramp_s": 1}, "process.ramp_s: unexpected key beside run_in_mm or run_out_mm"),
+        ({"repeat": 2}, "process.run_in_mm: expected none beside repeat; leave one of them out"),
+        (
+            {"path.circle": None, "path.rectangle": {"sides_mm": [30, 30], "plane": "xy", "center_mm": [0, 120]}},
+            "process.run_in_mm: expected a path without stops between its ends, got 3; round the corners",
+        ),
+        ({"process.run_in_mm": 900}, "out of reach, the best attempt leaves its tool tip 8"),
+    ],
+)
+def test_runs_that_cannot_be_are_refused(tmp_path: Path, changes: dict[str, object], message: str) -> None:
+    with pytest.raises((InputError, NoSolutionError), match=re.escape(message)):
+        planned(run_in(tmp_path, **changes))

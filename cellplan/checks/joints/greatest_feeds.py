@@ -93,15 +93,16 @@ def _greatest(times: Array, scheduled: TaskSchedule, feed: float, loads: Sequenc
     shares = np.max([load.shares[inside] for load in loads], axis=0)
     row = int(inside[shares.argmax()])
     worst = max(loads, key=lambda load: float(load.shares[row]))
+    run_in = scheduled.task.process.runs[0] if scheduled.task.process else 0.0
     steady = [(begin - TIME_TOLERANCE, end + TIME_TOLERANCE) for begin, end, _ in scheduled.demanded]
     return GreatestFeed(
         task=scheduled.task.name,
         feed=feed,
-        travelled=scheduled.travelled[inside],
+        travelled=scheduled.travelled[inside] - run_in,
         feeds=np.where(shares > LEAST_SHARE, feed / np.maximum(shares, LEAST_SHARE), np.inf),
         binding=worst.name,
         kind=worst.kind,
-        at=float(scheduled.travelled[row]),
+        at=float(scheduled.travelled[row]) - run_in,
         at_s=float(times[row]),
         point=_point(scheduled, row),
         is_in_ramp=not bool(are_within(times[row : row + 1], steady)[0]),

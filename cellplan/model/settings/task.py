@@ -163,6 +163,20 @@ class ProcessEntry(Entry):
         None, "Length of path on which it does, in place of ramp_s: all motion then scales with the feed."
     )
 
+    run_in_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = setting(
+        Mm(0.0),
+        "Length along the tangent on which the tool comes to the start of its path and to the feed, the process off. "
+        "The ramps are then as long as the shorter run.",
+    )
+    run_out_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = setting(
+        Mm(0.0), "Likewise behind the end of its path, on which the tool slows down."
+    )
+
+    @property
+    def runs(self) -> tuple[float, float]:
+        """Lengths in [m] of the run-in and of the run-out."""
+        return self.run_in_mm.si, self.run_out_mm.si
+
     @property
     def feed(self) -> float:
         """Demanded speed in [m/s], the greatest one of a path with several; a slow one while it is open."""
@@ -181,10 +195,16 @@ class ProcessEntry(Entry):
         return (self.feed_mm_s[0].si, self.feed_mm_s[1].si) if isinstance(self.feed_mm_s, tuple) else (0.0, np.inf)
 
     @property
+    def scales(self) -> bool:
+        """Whether its ramps have lengths, so that all motion scales with the feed."""
+        return self.ramp_mm is not None or any(self.runs)
+
+    @property
     def ramp(self) -> float:
         """Time of a ramp in [s]: on its length the mean speed is half the feed."""
-        if self.ramp_mm is not None:
-            return 2.0 * self.ramp_mm.si / self.feed
+        lengths = [run for run in self.runs if run > 0.0] if self.ramp_mm is None else [self.ramp_mm.si]
+        if lengths:
+            return 2.0 * min(lengths) / self.feed
         return USUAL_RAMP if self.ramp_s is None else self.ramp_s
 
     @model_validator(mode="after")
@@ -192,6 +212,11 @@ class ProcessEntry(Entry):
         """Only open feeds have a ratio; a ramp has a time or a length, and a length needs a feed."""
         if self.ramp_mm is not None and self.ramp_s is not None:
             raise rule("expected either ramp_s or ramp_mm, got both", "ramp_mm")
+        for key in ("ramp_s", "ramp_mm", "on_delay_s", "off_delay_s") if any(self.runs) else ():
+            if getattr(self, key):
+                raise rule("unexpected key beside run_in_mm or run_out_mm, in which the tool comes to its feed", key)
+        if any(self.runs) and self.feed_mm_s is None:
+            raise rule("unexpected key for a path whose file states the feeds", "run_in_mm")
         if self.ramp_mm is not None and self.feed_mm_s is None:
             raise rule("unexpected key for a path whose file states the feeds; write ramp_s", "ramp_mm")
         if self.feed_ratio != 1.0 and not self.has_open_feed:

@@ -14,6 +14,7 @@ from cellplan.geometry.curves.arc_length import QuickParameters
 from cellplan.geometry.curves.curve import Interval
 from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.geometry.transforms import Array, rotation_about
+from cellplan.model.settings.task import ProcessEntry
 from cellplan.model.task.pace import Pace
 from cellplan.model.task.task import TIME_TOLERANCE, Task, TimeLawKind
 from cellplan.model.task.time_law import advance, reached_at, stand_off
@@ -257,12 +258,21 @@ def leaves_at(task: Task, corners: Array) -> float:
 def process_spans(path: ClockedPath) -> Spans:
     """Stretches of time in [s] in which a process is on; without one, that from the start of the path to its end."""
     task, corners, pace = path.task, path.corners, path.pace
+    if task.process is not None and any(task.process.runs):
+        return (_between_runs(path, task.process),)
     if pace is None:
         return ((task.start, path.end + task.off_delay),)
     edges = np.flatnonzero(np.diff(pace.is_on.astype(np.int8))) + 1  # off and on in turns
     inner = corners[edges].tolist()
     ends = [task.start, *inner, path.end + task.off_delay]
     return tuple(zip(ends[0::2], ends[1::2], strict=True))
+
+
+def _between_runs(path: ClockedPath, process: ProcessEntry) -> tuple[float, float]:
+    """Times in [s] at which the tool has come in, at its feed, and begins to run out."""
+    halves = 0.5 * process.ramp  # a ramp takes this longer than its length does at the feed
+    on, off = (run / process.feed + halves if run else 0.0 for run in process.runs)
+    return path.start + on, path.end - off
 
 
 def fixed_rests(path: ClockedPath) -> Spans:

@@ -27,6 +27,7 @@ from cellplan.planning.path.curve import PathCurve, path_curve
 from cellplan.planning.path.formatting import MM, direction_name, in_mm, length
 from cellplan.planning.path.programmed import programmed_curve, with_programmed_corners
 from cellplan.planning.path.projection import along, project_path
+from cellplan.planning.path.runs import with_runs
 from cellplan.planning.path.seam import follow_seam
 from cellplan.planning.path.stretch import along_stretches, back_at_end, stretch_of
 from cellplan.planning.path.weave import woven_path
@@ -55,7 +56,7 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
     """
     outline = programmed_curve(task.path) if isinstance(task.path, ProgrammedPath) else path_curve(task)
     refuse_path_in_metres(outline.curve, task=task, part=part)
-    curve, orientation = _with_tool(task, project_path(outline, task, part))
+    curve, orientation = with_runs(task, *_with_tool(task, project_path(outline, task, part)))
     arc = measure(curve.curve)
     refuse_unlikely_path(curve.curve, arc, task=task, part=part)
     is_timed = isinstance(task.path, TimedPath)

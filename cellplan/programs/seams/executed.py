@@ -135,6 +135,11 @@ class SeamExecution:
         rows = self._rows
         if rows.X_PT is None or rows.feeds is None:
             raise InputError(f"robot '{rows.robot}': expected poses and speeds of the seam of '{seam.task}', got none")
+        process = self._frame.cell.task(seam.task).process
+        if process is not None and any(process.runs):
+            raise LineRefusedError(
+                seam.task, ": expected no run-in and no run-out, as a program of lines stops where its process begins"
+            )
         X, travelled, q = self._on_part(seam, q_entry[None])[0], 0.0, q_entry
         first = seam.first
         paths: list[tuple[int, SeamPath]] = []

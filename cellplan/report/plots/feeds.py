@@ -27,5 +27,6 @@ def feed_figure(greatest: GreatestFeed) -> Figure:
             PlotMark(MM * greatest.at, min(least, top), LIMIT if least < feed else INK),
         ],
     )
-    x = PlotAxis(low=0.0, high=MM * float(greatest.travelled[-1]), label="place on the path in mm", unit="mm")
+    low, high = MM * greatest.travelled[[0, -1]]
+    x = PlotAxis(low=float(low), high=float(high), label="place on the path in mm", unit="mm")
     return Figure(title=f"{greatest.task}: greatest feed over the path", x=x, panels=[panel])

@@ -102,10 +102,10 @@ def _refuse_open_feeds(request: LayoutRequest, cell: Cell) -> None:
             raise InputError(f"{where}: expected a number beside --timing retimed, got a feed to seek")
         if layout is not None and layout.misplacement is not None:
             raise InputError(f"{where}: expected a number where bases are misplaced, got a feed to seek")
-        if process is not None and process.ramp_mm is None and not cell.program.is_home_to_home:
+        if process is not None and not process.scales and not cell.program.is_home_to_home:
             raise InputError(
                 f"{feed.task.where('process.ramp_s')}: expected ramp_mm where the greatest feed is sought over a "
-                "layout, as all motion must scale with the feed; write process: {ramp_mm: 20}, with a length of yours"
+                "layout, as all motion must scale with the feed; write process: {ramp_mm: 20} or run_in_mm"
             )
 
 
