@@ -12,6 +12,7 @@ WALL_WORDS: Final = f"surface, left, right, {DIRECTION_WORDS}"
 MOST_WALLS: Final = 2  # beside one seam
 STEEPEST_DEG: Final = 90.0  # of a work angle: beyond it the tool is in the wall
 FLATTEST_DEG: Final = 80.0  # of a travel angle: beyond it the tool slides along the seam
+MOST_DWELL: Final = 0.8  # [-] of the period of a weave
 FARTHEST_PART_MM: Final = 100_000.0  # no path is longer
 FARTHEST_MM: Final = 500.0  # no tool works from farther away
 SURFACE: Final = "surface"
@@ -78,6 +79,14 @@ class WeaveEntry(Entry):
         if self.dwell == "standing" and not (self.dwell_left_s or self.dwell_right_s):
             raise rule("expected dwell_left_s or dwell_right_s beside it, got neither", "dwell")
         return self
+
+    def require_strokes(self, feed_mm_s: float) -> None:
+        """Refuse dwells that leave too little of each period for the way from edge to edge, at a feed in [mm/s]."""
+        period = (self.wavelength_mm or feed_mm_s / (self.frequency_hz or 1.0)) / feed_mm_s
+        dwells = self.dwell_left_s + self.dwell_right_s
+        if dwells > MOST_DWELL * period:
+            text = f"expected dwells of at most {MOST_DWELL:g} of the period of {period:.4g} s, got {dwells:.4g} s"
+            raise rule(text, f"path.weave.{'dwell_left_s' if self.dwell_left_s else 'dwell_right_s'}")
 
 
 class PathEntry(PathShapeEntry):

@@ -37,7 +37,6 @@ from cellplan.model.settings.task import (
 from cellplan.model.settings.units import Deg, Mm, Within
 from cellplan.model.units import MM
 
-MOST_DWELL: Final = 0.8  # [-] of the period of a weave
 EXCLUDED_BY_PROCESS: Final = ("duration_s", "feed_mm_s", "time_law", "settle_s")
 EXCLUDED_BY_FILE: Final = (*EXCLUDED_BY_PROCESS, "corners", "tool_turn_deg")  # of a path with rapids
 
@@ -342,10 +341,14 @@ class TaskEntry(Entry):
         """A seam has passes or stitches; a crater is filled by a process."""
         if self.passes is not None and self.stitch is not None:
             raise rule("expected either passes or stitch, got both", "stitch")
-        if self.crater is not None and self.process is None:
+        if self.crater is None:
+            return self
+        if self.process is None:
             raise rule("expected a process, which fills the crater", "crater")
-        if self.crater is not None and self.process is not None and self.process.off_delay_s:
+        if self.process.off_delay_s:
             raise rule("unexpected key, crater.time_s is this time: leave out one of them", "process.off_delay_s")
+        if self.path.back_mm is not None:
+            raise rule("unexpected key, crater.back_mm is this length: leave out one of them", "path.back_mm")
         return self
 
     @model_validator(mode="after")
@@ -358,13 +361,7 @@ class TaskEntry(Entry):
         if self.process is None and key is not None:
             raise rule("expected a process, whose feed says how long it is along the path", f"path.weave.{key}")
         if self.process is not None:
-            feed_mm_s = MM * self.process.feed
-            length = weave.wavelength_mm or feed_mm_s / (weave.frequency_hz or 1.0)
-            period = length / feed_mm_s
-            dwells = weave.dwell_left_s + weave.dwell_right_s
-            if dwells > MOST_DWELL * period:
-                text = f"expected dwells of at most {MOST_DWELL:g} of the period of {period:.4g} s, got {dwells:.4g} s"
-                raise rule(text, f"path.weave.{'dwell_left_s' if weave.dwell_left_s else 'dwell_right_s'}")
+            weave.require_strokes(MM * self.process.feed)
         return self
 
     @property

@@ -76,7 +76,7 @@ _LISTED: Final = (  # the gravest first
     CheckKind("tool_depth", "tool depth in the part within its limit", "Tool too deep in the part", concern=NEAR),
     CheckKind("standoff", "tool tips at their distance from the part", "Tool tip off the part", excess=DISTANCE),
     CheckKind("seam_distance", "tips of rods at their seams", "Tip too far from its seam", excess=DISTANCE),
-    CheckKind("wall_distance", "rods clear of the walls of seams", "Rod too near a wall", excess=DISTANCE, concern=NEAR),
+    CheckKind("wall_distance", "tools clear of the walls of seams", "Tool too near a wall", excess=DISTANCE, concern=NEAR),
     CheckKind("torch_angle", "tools within their angle from gravity", "Tool leans too far from gravity"),
     CheckKind("weld_slope", "slopes of welds within their limits", "Weld slopes too much", excess=DISTANCE),
     CheckKind("weld_rotation", "rotations of welds within their limits", "Weld face turned too far", excess=DISTANCE),

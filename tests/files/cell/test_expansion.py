@@ -166,6 +166,14 @@ def test_keys_that_make_no_tasks_are_refused(refuse: Refuse, keys: str, message:
     assert message in refuse(seam(keys))
 
 
+def test_crater_and_path_do_not_both_say_how_far_the_tool_goes_back(refuse: Refuse) -> None:
+    both = seam("    crater: {back_mm: 5, time_s: 0.8}")
+
+    assert refuse((both[0], both[1].replace("from: floor}", "from: floor, back_mm: 3}", 1))) == [
+        "c:19: tasks.root.path.back_mm: unexpected key, crater.back_mm is this length: leave out one of them"
+    ]
+
+
 @pytest.mark.parametrize("keys", [PASSES, "    tacks: {length_mm: 10, pitch_mm: 95}"])
 def test_file_with_other_values_has_the_parts_in_their_order(tmp_path: Path, load: Load, keys: str) -> None:
     load(seam(keys))
