@@ -13,8 +13,8 @@ from cellplan.geometry.curves.orientation import Orientation
 from cellplan.model.task.task import TimeLaw, TimeLawKind
 from cellplan.model.task.time_law import advance, reached_at
 
-TURN: Final = 0.1  # [-] of a stroke from edge to edge, in which it comes to its speed or from it
-STROKE_LAW: Final = TimeLaw(kind=TimeLawKind.STEADY, ramp=TURN)
+TURN: Final = 0.25  # [-] of a move between two rests, in which it comes to its speed or from it: shorter ones jerk
+MOVE_LAW: Final = TimeLaw(kind=TimeLawKind.STEADY, ramp=TURN)
 FITTED: Final = 2  # moves before the end of a seam that are as fast as it takes to be there in time
 
 
@@ -66,7 +66,7 @@ class StandingTravel:
         s = self.arc.lengths(old)
         k = np.clip(np.searchsorted(self.reached, s, side="right") - 1, 0, len(self.edges) - 2)
         width, move = np.diff(self.edges)[k], np.diff(self.reached)[k]
-        share = reached_at(STROKE_LAW, (s - self.reached[k]) / np.where(move > 0.0, move, 1.0))
+        share = reached_at(MOVE_LAW, (s - self.reached[k]) / np.where(move > 0.0, move, 1.0))
         return self.arc.parameters(self.edges[k] + width * share, self.whole)
 
     def at(self, v: Array, interval: Interval) -> tuple[Array, Interval, Array]:  # noqa: ARG002
@@ -74,7 +74,7 @@ class StandingTravel:
         s = self.arc.lengths(v)
         k = np.clip(np.searchsorted(self.edges, s, side="right") - 1, 0, len(self.edges) - 2)
         width, move = np.diff(self.edges)[k], np.diff(self.reached)[k]
-        law = advance(STROKE_LAW, np.clip((s - self.edges[k]) / width, 0.0, 1.0))
+        law = advance(MOVE_LAW, np.clip((s - self.edges[k]) / width, 0.0, 1.0))
         real = self.arc.parameters(self.reached[k] + move * law.share, self.whole)
         even, here = (np.linalg.norm(self.line.evaluate(it, self.whole)[1], axis=1) for it in (v, real))
         return real, self.whole, (move / width * law.rate * even / here)[:, None]

@@ -15,12 +15,14 @@ from cellplan.geometry.curves.rerun import RerunSeam
 from cellplan.geometry.curves.seam_line import SeamPlaces
 from cellplan.geometry.transforms import cross
 from cellplan.model.task.seam import Weave, WeaveForm
-from cellplan.model.task.task import Task
+from cellplan.model.task.task import Task, TimeLaw, TimeLawKind
 from cellplan.model.task.time_law import advance
 from cellplan.planning.path.curve import PathCurve
 from cellplan.planning.path.formatting import in_mm
-from cellplan.planning.path.standing import STROKE_LAW, TURN, StandingFrame, StandingTravel
+from cellplan.planning.path.standing import StandingFrame, StandingTravel
 
+TURN: Final = 0.1  # [-] of a stroke from edge to edge, in which it comes to its speed or from it
+STROKE_LAW: Final = TimeLaw(kind=TimeLawKind.STEADY, ramp=TURN)
 DIRECTION_FIT: Final = 1e-7  # [-] of unit vectors across a seam: a weave of 10 mm is off by a nanometre
 SAME_KNOT: Final = 1e-9  # [-] of a wavelength: knots nearer to one another are one, but for rounding
 NO_JUMP: Final = 1e-7  # [m] of a tip at a corner

@@ -6,7 +6,7 @@ window that all joints share is taken, so that accelerations change evenly over 
 motion with that jerk. The motion is then made slower as a whole until every limit holds in the rows of the tables.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Protocol, Self
 
@@ -151,9 +151,16 @@ class Retimer:
         """The fastest motion found along a path."""
         made: list[tuple[int, TimedRows]] = []
         rest = 0.0
-        for piece in stretches(path, self.bounds.velocity):
-            made += [*self._rest(rest, float(piece.sigma[0])), self._at_fixed_rate(piece) or self._settled(piece)]
-            rest = float(piece.sigma[-1])
+        for pieces in self._joined(stretches(path, self.bounds.velocity)):
+            begin, end = float(pieces[0].sigma[0]), float(pieces[-1].sigma[-1])
+            whole = self._at_fixed_rate(replace(pieces[0], sigma=np.array([begin, end]))) if len(pieces) > 1 else None
+            if whole is not None:
+                made += [*self._rest(rest, begin), whole]
+                rest = end
+                continue
+            for piece in pieces:
+                made += [*self._rest(rest, float(piece.sigma[0])), self._at_fixed_rate(piece) or self._settled(piece)]
+                rest = float(piece.sigma[-1])
         made += self._rest(rest, path.end)
         retimed = RetimedPath(
             motions=tuple(motion for _, motion in made), counts=tuple(count for count, _ in made), end=path.end
@@ -169,6 +176,23 @@ class Retimer:
                 return retimed
             retimed = replace(retimed, counts=counts)
         return retimed
+
+    def _joined(self, pieces: Sequence[PathStretch]) -> list[list[PathStretch]]:
+        """Stretches in groups, between which joints rest for a while within one stretch whose rate is demanded.
+
+        A tool that stands at the edges of its weave does so: such a rest is passed at that rate like all around it, not
+        rounded up to whole steps.
+        """
+        groups: list[list[PathStretch]] = []
+        for piece in pieces:
+            begin, end = float(groups[-1][-1].sigma[-1]) if groups else 0.0, float(piece.sigma[0])
+            is_within = any(it.begin < begin and end < it.end for it in self.fixed_rates)
+            is_short = piece.sigma[-1] - piece.sigma[0] < FEWEST_STEPS * self.step  # one in which joints hardly move
+            if groups and is_within and (is_short or end - begin > MARGIN):
+                groups[-1].append(piece)
+            else:
+                groups.append([piece])
+        return groups
 
     def _rest(self, begin: float, end: float) -> list[tuple[int, TimedRows]]:
         """What is demanded of a rest of all joints with its steps; nothing where no time has to pass.

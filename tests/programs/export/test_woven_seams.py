@@ -98,6 +98,21 @@ def test_rows_weave_elsewhere_and_travel_at_the_feed(tmp_path: Path) -> None:
     assert speed["peak_mm_s"] == pytest.approx(8.0, rel=1e-3)  # of travel: the tip itself is faster
 
 
+@pytest.mark.slow
+def test_tool_that_stands_keeps_its_mean_feed_in_a_retimed_program_too(tmp_path: Path) -> None:
+    dwells = "frequency_hz: 1.75, dwell_left_s: 0.1, dwell_right_s: 0.05, dwell: standing"
+    text = CELL.replace("weave_mm: 2", "weave_mm: 0").replace("side_mm: 2, wavelength_mm: 4", f"side_mm: 1.5, {dwells}")
+    text = text.replace("feed_mm_s: 8", "feed_mm_s: 7").replace("step_s: 0.004", "step_s: 0.004, timing: fastest")
+    (tmp_path / "cell.yaml").write_text(text, encoding="utf-8")
+    status, out, error = run_command("cellplan solve cell.yaml -o run", tmp_path)
+    assert status == 0, out + error
+
+    checks = json.loads((tmp_path / "run" / "work-1" / "report.json").read_text(encoding="utf-8"))["checks"]
+    (feed,) = (check for check in checks if check["name"] == "process_feed")
+    assert feed["value"] <= 0.1  # [%] of the feed, in every step; rests rounded up to whole steps would take up to 4 %
+
+
+@pytest.mark.slow
 def test_lines_of_a_tool_that_stands_at_the_edges_of_its_weave_are_refused(tmp_path: Path) -> None:
     dwells = "wavelength_mm: 4, dwell_left_s: 0.1, dwell: standing"
     text = CELL.replace("weave_mm: 2", "weave_mm: 0").replace("wavelength_mm: 4", dwells)
