@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders.drawings import CUT, write_drawing
+from builders.drawings import CUT, HEAD, LINE, TAIL, entity, write_drawing
 from builders.step_files import Named, box, moved, write_step
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
@@ -235,6 +235,16 @@ def test_a_task_along_an_outline_has_a_process_and_no_times(folder: Path) -> Non
     assert "tasks.cut.repeat: expected 1 for a path with rapids" in words(process, f"{process}    repeat: 2\n")
     world = words(process, f"{process}    relative_to: world\n")
     assert "tasks.cut.relative_to: expected part for a path on the part, got world" in world
+
+
+def test_a_spoilt_drawing_is_refused_by_its_line_from_the_child_process(folder: Path) -> None:
+    text = HEAD + LINE + entity("TEXT", (10, 0), (20, 0), (40, 3), (1, "words")) + TAIL
+    (folder / "spoilt.dxf").write_text(text.replace("0\nLINE", "0\nLINE\n5\n2E").replace("TEXT", "TEXT\n5\n2F"))
+
+    assert refusal(folder, "outline: spoilt.dxf, layer: CUT, project: +z", BALL) == (
+        "spoilt.dxf:33: TEXT #2F: expected LINE, ARC, CIRCLE, ELLIPSE, LWPOLYLINE, POLYLINE and SPLINE on the layer "
+        "CUT, got this; move it to another layer"
+    )
 
 
 def test_without_the_extra_the_package_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
