@@ -1,10 +1,11 @@
 """Refusals: what speaks against a recovery as the files of a run say already, before anything is computed."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
-from cellplan.errors import InputError, raise_findings
+from cellplan.errors import InputError, raise_findings, refusals
 from cellplan.files.input.findings import listed
 from cellplan.files.run.content import RECOVER, RECOVERY
 from cellplan.files.run.folder import refuse_unless_replaceable
@@ -41,8 +42,7 @@ def refuse_recovery(
     """Refuse a recovery, and its programs in some formats, of which the files of a run say that they cannot be."""
     _require_within(run.end(), at, "--at")
     refuse_state(run.cell, run.clock(), at=at, frozen=frozen, keep=keep)
-    for form in formats:
-        recovery_frame(run, form)
+    raise_findings(refusals(*(partial(recovery_frame, run, form) for form in formats)))
 
 
 def refuse_state(

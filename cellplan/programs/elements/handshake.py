@@ -9,6 +9,7 @@ Tasks of one ABB controller need no wires among themselves: they meet at the mar
 the robots of other controllers, if there are any, and then they meet once more, before any of them goes on.
 """
 
+from collections.abc import Callable
 from functools import partial
 from typing import Final, NamedTuple
 
@@ -94,14 +95,18 @@ def first_steps(frame: ExportFrame, robot: str) -> list[HandshakeStep]:
     return [lowering_step(frame, robot)] if _senders(frame, robot) else []
 
 
-def signals_by_key(frame: ExportFrame, robot: str) -> dict[str, str]:
-    """Stated signals of a robot by their keys in the cell file, its output first; none where none is stated."""
+def require_signals_like(frame: ExportFrame, robot: str, fits: Callable[[str], object], expected: str) -> None:
+    """Require stated signals of a robot to be such as a language takes; the ``InputError`` names all that are not."""
     control = frame.robot(robot).control
     if control is None or control.handshake is None:
-        return {}
-    key = f"robots.{robot}.controller.handshake"
-    inputs = {f"{key}.inputs.{other}": str(signal) for other, signal in control.handshake.inputs.items()}
-    return {f"{key}.output": str(control.handshake.output)} | inputs
+        return
+    key, wires = f"robots.{robot}.controller.handshake", control.handshake
+    signals = {"output": wires.output} | {f"inputs.{other}": signal for other, signal in wires.inputs.items()}
+    raise_findings(
+        InputError(f"{key}.{wire}: expected {expected}, got '{signal}'")
+        for wire, signal in signals.items()
+        if not fits(str(signal))
+    )
 
 
 def require_signals(frame: ExportFrame, robot: str) -> None:

@@ -134,6 +134,15 @@ def test_signals_of_all_robots_and_their_names_are_said_at_once(read: ReadRun) -
         assert f"robots.left.controller.handshake.inputs: expected the input that '{name}' sets, got none" in said
     for name in NAMES:
         assert f"robots.{name}.controller.handshake.output: expected a whole number from 1 to 4096" in said
+        assert f"robots.{name}.controller.handshake.inputs.left: expected a whole number from 1 to 4096" in said
+
+
+def test_what_programs_of_a_recovery_need_in_several_formats_is_said_at_once(read: ReadRun) -> None:
+    with pytest.raises(InputError) as refusal:
+        refuse_recovery(read, at=0.1, frozen={}, keep=(), formats=("krl", "rapid"))
+
+    for form in ("krl", "rapid"):
+        assert f"which plays {form}" in str(refusal.value) or f"that plays {form}" in str(refusal.value)
 
 
 @pytest.mark.parametrize("promise", [None, Promise.SEQUENCE_ONLY])

@@ -13,7 +13,7 @@ from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, Moves, Promise
 from cellplan.model.task.task import Frame
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.elements.handshake import signals_by_key
+from cellplan.programs.elements.handshake import require_signals_like
 from cellplan.programs.elements.joints import Axes, require_counted
 from cellplan.programs.elements.pages import ProgramNames, page_names, robots_of
 from cellplan.programs.formats.fanuc_ls.poses import configuration
@@ -193,8 +193,5 @@ def _require_frames(frame: ExportFrame, robot: str) -> None:
 
 def _require_signals(frame: ExportFrame, robot: str) -> None:
     """Refuse signals that are no numbers."""
-    for path, signal in signals_by_key(frame, robot).items():
-        if not re.fullmatch(r"[1-9][0-9]{0,4}", signal):
-            raise InputError(
-                f"{path}: expected a whole number from 1, as FANUC controllers number their signals, got '{signal}'"
-            )
+    expected = "a whole number from 1, as FANUC controllers number their signals"
+    require_signals_like(frame, robot, re.compile(r"[1-9][0-9]{0,4}").fullmatch, expected)

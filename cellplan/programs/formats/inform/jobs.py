@@ -15,7 +15,7 @@ from cellplan.model.report.exported import ExportFrame, Moves, Promise, Station
 from cellplan.model.task.task import CirclePath, Task
 from cellplan.model.units import MM
 from cellplan.programs.elements.frames import controller_base, require_rest
-from cellplan.programs.elements.handshake import HandshakeStep, signals_by_key
+from cellplan.programs.elements.handshake import HandshakeStep, require_signals_like
 from cellplan.programs.elements.joints import Axes
 from cellplan.programs.elements.paced import Events
 from cellplan.programs.elements.process import ProcessForm
@@ -182,9 +182,9 @@ def _require_within(key: str, number: int | None, bounds: tuple[int, int], what:
 
 def _require_signals(frame: ExportFrame, robot: str) -> None:
     """Refuse signals that are no numbers."""
-    for path, signal in signals_by_key(frame, robot).items():
-        if not re.fullmatch(r"[1-9][0-9]{0,3}", signal):
-            raise InputError(f"{path}: expected a whole number from 1, as in OT#(1) and IN#(1), got '{signal}'")
+    require_signals_like(
+        frame, robot, re.compile(r"[1-9][0-9]{0,3}").fullmatch, "a whole number from 1, as in OT#(1) and IN#(1)"
+    )
 
 
 def tasks_of(frame: ExportFrame, robot: str) -> Mapping[str, str]:

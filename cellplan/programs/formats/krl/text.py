@@ -8,7 +8,7 @@ from typing import Final
 
 from cellplan.errors import InputError
 from cellplan.model.report.exported import ExportFrame
-from cellplan.programs.elements.handshake import signals_by_key
+from cellplan.programs.elements.handshake import require_signals_like
 from cellplan.programs.elements.pages import ProgramNames
 from cellplan.programs.elements.text import Statement, line_error, split_lines
 
@@ -54,12 +54,9 @@ _FIRST: Final = re.compile(r"(DEF|DEFDAT)\s+(\w+)\s*(\(\s*\)|)(?:\s+PUBLIC)?", r
 
 def require_numbers(frame: ExportFrame, robot: str) -> None:
     """Refuse handshake signals that are not the numbers of inputs and outputs."""
-    for path, signal in signals_by_key(frame, robot).items():
-        if not re.fullmatch(r"[1-9][0-9]{0,3}", signal) or int(signal) > LAST_SIGNAL:
-            raise InputError(
-                f"{path}: expected a whole number from 1 to {LAST_SIGNAL}, as KUKA controllers number their signals, "
-                f"got '{signal}'"
-            )
+    numbers = frozenset(map(str, range(1, LAST_SIGNAL + 1)))
+    expected = f"a whole number from 1 to {LAST_SIGNAL}, as KUKA controllers number their signals"
+    require_signals_like(frame, robot, numbers.__contains__, expected)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,7 +35,7 @@ from cellplan.model.units import MM
 from cellplan.programs.elements.corners import chosen_shares, moves, row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.frames import on_flange
-from cellplan.programs.elements.handshake import first_steps, handshake_steps, signals_by_key
+from cellplan.programs.elements.handshake import first_steps, handshake_steps, require_signals_like
 from cellplan.programs.elements.head import head_notes
 from cellplan.programs.elements.joints import from_numbers, to_numbers
 from cellplan.programs.elements.text import comment, fixed, joined, safe_names
@@ -201,11 +201,8 @@ def _moves(
 
 def _require_names(frame: ExportFrame, robot: str) -> None:
     """Make sure that the signals of a robot are names that RAPID takes."""
-    for key, signal in signals_by_key(frame, robot).items():
-        if not NAME.fullmatch(signal) or signal.lower() in WORDS:
-            raise InputError(
-                f"{key}: expected the name of a signal of at most {LONGEST_NAME} letters, digits and _, got {signal!r}"
-            )
+    expected = f"the name of a signal of at most {LONGEST_NAME} letters, digits and _"
+    require_signals_like(frame, robot, lambda name: NAME.fullmatch(name) and name.lower() not in WORDS, expected)
 
 
 def _modules(

@@ -10,7 +10,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import ExportFrame, Promise
 from cellplan.model.settings.units import si_or_none
-from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step, signals_by_key
+from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps, lowering_step, require_signals_like
 from cellplan.programs.elements.joints import ARM
 from cellplan.programs.elements.pages import MOST_PAGES
 from cellplan.programs.elements.text import safe_names
@@ -135,6 +135,4 @@ def lowering(frame: ExportFrame, robot: str) -> str:
 
 def require_standard_signals(frame: ExportFrame, robot: str) -> None:
     """Make sure that the signals of a robot are standard digital ones."""
-    for key, signal in signals_by_key(frame, robot).items():
-        if signal not in SIGNALS:
-            raise InputError(f"{key}: expected a standard digital signal 0 to 7, got '{signal}'")
+    require_signals_like(frame, robot, SIGNALS.__contains__, "a standard digital signal 0 to 7")

@@ -4,9 +4,8 @@ import re
 from collections.abc import Iterable
 from typing import Final
 
-from cellplan.errors import InputError
 from cellplan.model.report.exported import ExportFrame
-from cellplan.programs.elements.handshake import HandshakeStep, signals_by_key
+from cellplan.programs.elements.handshake import HandshakeStep, require_signals_like
 from cellplan.programs.elements.pages import ProgramNames
 
 NAME: Final = 15  # most characters of a name, that of a tool excepted
@@ -60,8 +59,5 @@ def link(signal: str, *, is_input: bool) -> str:
 
 def require_links(frame: ExportFrame, robot: str) -> None:
     """Refuse handshake signals that are no links."""
-    for path, signal in signals_by_key(frame, robot).items():
-        if not re.fullmatch(r"[A-Za-z0-9_%.:/\\-]+", signal):
-            raise InputError(
-                rf"{path}: expected a number, or the link of a signal such as 'BasicIO-1\%Q0', got '{signal}'"
-            )
+    expected = r"a number, or the link of a signal such as 'BasicIO-1\%Q0'"
+    require_signals_like(frame, robot, re.compile(r"[A-Za-z0-9_%.:/\\-]+").fullmatch, expected)
