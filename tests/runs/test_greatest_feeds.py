@@ -225,3 +225,11 @@ def test_the_feed_holds_all_along_the_work_where_the_tool_runs_in_and_out(tmp_pa
 def test_runs_that_cannot_be_are_refused(tmp_path: Path, changes: dict[str, object], message: str) -> None:
     with pytest.raises((InputError, NoSolutionError), match=re.escape(message)):
         planned(run_in(tmp_path, **changes))
+
+
+def test_the_share_of_a_controller_lowers_the_feeds_that_its_joints_bind(tmp_path: Path) -> None:
+    cell = cell_of(tmp_path, THREE_FEEDS)
+    full, lower = (answers(planned(cell.with_values({"robots.top.controller_share": share}))) for share in (1.0, 0.8))
+
+    assert lower["ring"].greatest == pytest.approx(0.8 * full["ring"].greatest)
+    assert lower["seam"].greatest == full["seam"].greatest

@@ -64,7 +64,7 @@ def _loads(scene: Scene, name: str, times: Array, q: Array) -> list[_Load]:
     cell = scene.cell
     robot = cell.robot(name)
     limits = rate_limits(cell)[:, cell.columns(name)]
-    shares = (row_loads(robot, times, q) / limits[:, None, :]) ** ORDERS[:, None, None]
+    shares = (row_loads(robot, times, q) / limits[:, None, :]) ** ORDERS[:, None, None] / robot.controller_share
     loads = [
         _Load(f"{name} {joint.name}", kind, shares[row, :, column])
         for column, joint in enumerate(robot.model.joints)

@@ -301,6 +301,11 @@ class RobotEntry(Entry):
     controller: RobotControlEntry | None = setting(
         None, "Where it is connected, and how programs of its controller name things."
     )
+    controller_share: Annotated[float, Field(gt=0.0, le=1.0)] = setting(
+        1.0,
+        "Share of the greatest feed that its joint limits allow which its controller reaches, such as 0.85; feeds that "
+        "are sought are lower by it.",
+    )
     controller_cycle_ms: CycleTime | None = setting(
         None,
         "Cycle of its controller, over which jerk is taken; when absent that of the key controller, else the motion's.",

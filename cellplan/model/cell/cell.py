@@ -68,6 +68,7 @@ class Robot:
         home: Configuration while it is idle in [rad] or [m], shape (n,); None when it is to be searched.
         acceleration: Accelerations that its joints are checked against.
         controller_cycle: Cycle of its controller in [s], over which jerk is computed.
+        controller_share: Share of the greatest feed by its limits that its controller reaches.
         attachments: Solids mounted on its links, their poses ``X_BS`` in B while all joints read zero.
         pedestal: What the base stands on, hangs from or is fixed to; None for a base on the floor or on an obstacle.
         gripper: Names of link bodies of its model that make up a gripper, which may work on the part as a tool does.
@@ -87,6 +88,7 @@ class Robot:
     home: Array | None = None
     acceleration: AccelerationRule = USUAL_ACCELERATION
     controller_cycle: float = USUAL_CYCLE
+    controller_share: float = 1.0
     attachments: tuple[Body, ...] = ()
     pedestal: Mount | None = None
     gripper: tuple[str, ...] = ()

@@ -71,6 +71,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         home=home,
         acceleration=acceleration_rule(entry, document.acceleration, joints=len(model.joints)),
         controller_cycle=controller_cycle(entry, document),
+        controller_share=entry.controller_share,
         attachments=build_attachments(entry.attachments, model, read_mesh),
         pedestal=build_mount(entry, document.environment),
         gripper=gripper_bodies(entry, model),
