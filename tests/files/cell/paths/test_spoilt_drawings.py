@@ -200,6 +200,19 @@ def test_blocks_within_themselves_and_blocks_that_multiply_are_refused(tmp_path:
         document.blocks.new("A").add_blockref("A", (1, 0), dxfattribs={"layer": "CUT"})
         space.add_blockref("A", (0, 0), dxfattribs={"layer": "CUT"})
 
+    def array(document, space) -> None:
+        document.blocks.new("C").add_circle((0, 0), 1)
+        many = {"layer": "CUT", "row_count": 30000, "column_count": 30000, "row_spacing": 9, "column_spacing": 9}
+        space.add_blockref("C", (0, 0), dxfattribs=many)
+
+    assert "expected at most 16 blocks within one another, got more" in refusal(write_drawing(tmp_path, endless))
+    assert "expected at most 100000 curves, those of blocks included, got more" in refusal(
+        write_drawing(tmp_path, array)
+    )
+
+
+@pytest.mark.slow
+def test_blocks_that_multiply_within_one_another_are_refused(tmp_path: Path) -> None:
     def bomb(document, space) -> None:
         for level in range(12):
             block = document.blocks.new(f"B{level}")
@@ -210,16 +223,7 @@ def test_blocks_within_themselves_and_blocks_that_multiply_are_refused(tmp_path:
                     block.add_circle((place, 0), 1)
         space.add_blockref("B11", (0, 0), dxfattribs={"layer": "CUT"})
 
-    def array(document, space) -> None:
-        document.blocks.new("C").add_circle((0, 0), 1)
-        many = {"layer": "CUT", "row_count": 30000, "column_count": 30000, "row_spacing": 9, "column_spacing": 9}
-        space.add_blockref("C", (0, 0), dxfattribs=many)
-
-    assert "expected at most 16 blocks within one another, got more" in refusal(write_drawing(tmp_path, endless))
-    assert "expected at most 100000 curves, those of blocks included, got more" in refusal(
-        write_drawing(tmp_path, array)
-    )
-    assert "expected at most " in refusal(write_drawing(tmp_path, bomb))
+    assert "expected at most 100000 curves, " in refusal(write_drawing(tmp_path, bomb))
 
 
 @pytest.mark.slow
@@ -228,5 +232,5 @@ def test_a_large_drawing_stays_within_the_memory_of_the_guard(tmp_path: Path) ->
     file = write_text(tmp_path, entities)
     assert file.stat().st_size < MOST_BYTES
 
-    with pytest.raises(InputError, match=r"^logo\.dxf"):
+    with pytest.raises(InputError, match=r"^logo\.dxf:\d+: LINE #\w+: expected at most 100000 curves, got more"):
         in_child(read_drawing, file, settings(), guard=Guard(file="logo.dxf", worker="the DXF reader"))
