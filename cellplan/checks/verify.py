@@ -25,6 +25,7 @@ from cellplan.checks.tools.between_checks import (
     with_between,
 )
 from cellplan.checks.tools.conditioning import conditioning
+from cellplan.checks.tools.listed_path import check_listed, listed_errors
 from cellplan.checks.tools.seam_distances import check_seam_distances
 from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
 from cellplan.checks.tools.tracking import check_accuracy, check_closure
@@ -184,9 +185,11 @@ def _errors(
     scene: Scene, schedule: Schedule, q: RobotRows, X_WP: Array
 ) -> tuple[tuple[TaskAccuracy, ...], tuple[ClosureAccuracy, ...]]:
     """Errors of all tasks and of all closures, at the rows and between them."""
-    accuracy = tuple(
+    listed = listed_errors(schedule, scene.chains, q, X_WP)
+    errors = (
         task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
     )
+    accuracy = tuple(replace(error, listed=listed.get(error.task)) for error in errors)
     closures = closure_accuracy(scene.cell, scene.chains, q, X_WP)
     return check_between_rows(scene, schedule, q, accuracy=accuracy, closures=closures)
 
@@ -199,6 +202,7 @@ def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccu
         at_rows = check_accuracy(schedule, errors, scheduled.task)
         merged = with_between(at_rows, check_task_between(errors, tolerance))
         checks += with_locked_joints(merged, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
+        checks += check_listed(scheduled.task, errors.listed)
     return checks
 
 

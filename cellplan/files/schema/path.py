@@ -29,6 +29,8 @@ SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direct
 CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
 OF_FILES: Final = ("csv", "apt", "gcode")
 MOST_EDGES: Final = 50  # in one path
+LEAST_TUBE: Final = 1e-3  # [mm], [deg] of a tube: tables of points are no finer
+WIDEST_SMOOTHED_DEG: Final = 45.0  # farther from its direction a tool does other work
 
 
 class PolylineEntry(Entry):
@@ -92,6 +94,31 @@ CsvChoice = Annotated[
 ]
 
 
+class SmoothEntry(Entry):
+    """How far points and tool axes of a file may be moved to make the path smooth."""
+
+    position_mm: Annotated[Mm, Within(ge=LEAST_TUBE, le=FARTHEST_MM)] | None = setting(
+        None,
+        "Largest distance of the smoothed tool tip from the given one, less than the position tolerance of the task, "
+        "which it shares with the tracking error; absent: points stay.",
+    )
+    direction_deg: Annotated[Deg, Within(ge=LEAST_TUBE, le=WIDEST_SMOOTHED_DEG)] | None = setting(
+        None, "Likewise the largest angle between the tool's axis and the given one; absent: axes stay."
+    )
+    into_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_MM)] = setting(
+        Mm(0.0), "Largest distance of the smoothed tool tip from the given one along the given axis, into the part."
+    )
+
+    @model_validator(mode="after")
+    def _moves_anything(self) -> Self:
+        """A distance or an angle; the depth is part of the distance."""
+        if self.position_mm is None and self.direction_deg is None:
+            raise rule("missing, expected position_mm, direction_deg or both", "position_mm")
+        if self.into_mm > (self.position_mm or 0.0):
+            raise rule(f"expected at most position_mm = {self.position_mm or 0.0:g}, got {self.into_mm:g}", "into_mm")
+        return self
+
+
 class PathShapeEntry(OneOf):
     """Exactly one path, and its projection onto the part."""
 
@@ -144,6 +171,9 @@ class PathShapeEntry(OneOf):
         "Side of the part, as a direction in the part frame, from which the path is projected onto the part; absent: "
         "not projected. An outline is drawn in the plane across it through the origin, as under `on`.",
     )
+    smooth: SmoothEntry | None = setting(
+        None, "Tube round the points and axes of a file within which they are made as smooth as possible."
+    )
     offset_mm: Coordinate | None = setting(
         None, "Shift of a planar path that is not projected along the plane's normal axis; 0 when absent."
     )
@@ -159,6 +189,10 @@ class PathShapeEntry(OneOf):
             raise rule("unexpected key, a path of CAM is used as it stands in the file", "project")
         if self.is_edge and self.project is not None:
             raise rule("unexpected key, edges lie on the part already", "project")
+        if self.smooth is not None and self.file_key is None:
+            raise rule("unexpected key, only a path of a file (csv, apt, gcode) is smoothed", "smooth")
+        if self.smooth is not None and self.project is not None:
+            raise rule("unexpected key, a projected path takes its points and normals from the part", "smooth")
         if not self.is_edge and self.start_at_mm is not None:
             raise rule("unexpected key, only edges that are closed begin anywhere", "start_at_mm")
         return self

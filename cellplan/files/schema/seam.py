@@ -163,6 +163,8 @@ class PathEntry(PathShapeEntry):
         """Angles have walls, walls have angles, and one of the walls is what the work angle is measured from."""
         if self.push_deg is not None and self.drag_deg is not None:
             raise rule("expected either push_deg or drag_deg, got both", "drag_deg")
+        if self.smooth is not None and self.seam_keys:
+            raise rule("unexpected key beside smooth, which is for a path as its file has it", self.seam_keys[0])
         if self.is_edge:
             self._require_no_walls()
             return self

@@ -131,6 +131,14 @@ def rounded_lines(knots: Array, corners: Array, direction: Array, blends: Array)
     return BezierCurve(knots=np.concatenate([edges[:-1][is_long], edges[-1:]]), control=spans[is_long])
 
 
+def turns(points: Array) -> Array:
+    """Change of direction in [rad] at each inner point of straight sides, shape (N - 2,)."""
+    sides = np.diff(points, axis=0)
+    t = sides / np.linalg.norm(sides, axis=1, keepdims=True)
+    sine = np.linalg.norm(np.cross(t[:-1], t[1:]), axis=1)
+    return np.arctan2(sine, np.sum(t[:-1] * t[1:], axis=1))
+
+
 def smooth_through(knots: Array, values: Array, *, breaks: Flags) -> BezierCurve:
     """Cubic curve through values of shape (N, 3) at ``knots``, with continuous derivatives except at the breaks.
 

@@ -5,7 +5,7 @@ z axes: its orientation R goes to S R diag(1, -1, 1). Push stays push; left and 
 """
 
 from dataclasses import replace
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from cellplan.model.task.task import (
     TimedPath,
 )
 
+Targets = TypeVar("Targets", SampledPath, TimedPath)
 OF_TOOL: Final = np.array([1.0, -1.0, 1.0])  # signs of the axes of a tool that is its own mirror image
 OPPOSITE: Final = {
     RunDirection.CLOCKWISE: RunDirection.COUNTERCLOCKWISE,
@@ -90,13 +91,23 @@ def _path(task: Task, mirrored: Task, S: Array) -> PathSpec:
             return replace(path, center=(first * u, second * v), start=start, direction=direction or path.direction)
         case SpacePolylinePath():
             return replace(path, points=tuple((S[0] * x, S[1] * y, S[2] * z) for x, y, z in path.points))
-        case SampledPath() | TimedPath():
-            axes = None if path.axes is None else S * path.axes
-            rotations = None if path.rotations is None else S[:, None] * path.rotations * OF_TOOL
-            return replace(path, points=S * path.points, axes=axes, rotations=rotations)
+        case SampledPath():
+            return _by_file(path, S)
+        case TimedPath():
+            return _by_file(path, S)
         case _:
             walls = {name: S * normals for name, normals in path.walls.items()}
             return replace(path, points=S * path.points, tangents=S * path.tangents, walls=walls)
+
+
+def _by_file(path: Targets, S: Array) -> Targets:
+    """Tool targets of a file on the other side, those before smoothing too."""
+    axes = None if path.axes is None else S * path.axes
+    rotations = None if path.rotations is None else S[:, None] * path.rotations * OF_TOOL
+    moved = replace(path, points=S * path.points, axes=axes, rotations=rotations)
+    if isinstance(moved, SampledPath) and moved.smoothing is not None:
+        return replace(moved, smoothing=replace(moved.smoothing, listed=_by_file(moved.listed, S)))
+    return moved
 
 
 def _run_direction(task: Task, mirrored: Task, plane: PlaneName, direction: RunDirection, S: Array) -> RunDirection:

@@ -14,6 +14,7 @@ from cellplan.model.report.check_kinds import CHECK_KINDS, CheckKind
 from cellplan.model.report.greatest_feed import GreatestFeed
 from cellplan.model.report.left_out import LeftOut
 from cellplan.model.report.skew import SkewReport
+from cellplan.model.report.smoothing import ListedErrors
 from cellplan.model.report.stops import StopReport
 from cellplan.model.robot.payload import LoadUse
 from cellplan.model.robot.repeatability import Repeatability
@@ -105,6 +106,7 @@ class TaskAccuracy:
         None  # largest angle in [rad] of a tool's axis from the desired one, where it may lean; or None
     )
     process_off: Spans = ()  # stretches of time in [s] along its path, from rapid to rapid, in which its process is off
+    listed: ListedErrors | None = None  # errors against the points of its file, where its path was smoothed; or None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -7,10 +7,12 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
+from cellplan.geometry.curves.curve import turns
 from cellplan.geometry.curves.seam_line import SeamLine
 from cellplan.model.origin import Origin
 from cellplan.model.settings.task import ProcessEntry, ToleranceEntry, TorchEntry, WeldPositionEntry
 from cellplan.model.task.seam import Seam, Stretch, Weave
+from cellplan.model.task.smoothing import Smoothing
 
 TIME_TOLERANCE: Final = 1e-9  # [s] times nearer than this are the same: rounding of sums of durations
 
@@ -81,6 +83,17 @@ class SampledPath:
     join: float = 0.0  # distance in [m] within which points of the file were joined to the point before; 0 for none
     # line of each point in the file, for messages; empty where they follow one another from line 2
     lines: tuple[int, ...] = ()
+    smoothing: Smoothing | None = None  # how points and axes were smoothed; None where they are those of the file
+
+    @property
+    def listed(self) -> "SampledPath":
+        """The path by the points and axes of its file."""
+        return self if self.smoothing is None else self.smoothing.listed
+
+    @property
+    def tool_axes(self) -> Array | None:
+        """Unit tool axes, shape (N, 3); None where the file gives no orientation."""
+        return self.axes if self.rotations is None else self.rotations[:, :, 2]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -91,6 +104,11 @@ class ProgrammedPath(SampledPath):
     is_rapid: Flags  # whether the process is off on each side, shape (N - 1,)
     rounding: float  # largest distance in [m] of a rounded corner from the sides
     stop_angle: float  # change of direction in [rad] from which on a corner is a stop
+
+    @property
+    def inner_stops(self) -> Flags:
+        """Whether the tool stops at each inner point, by the directions of the file, shape (N - 2,)."""
+        return (turns(self.listed.points) > self.stop_angle) | np.diff(self.is_rapid)
 
     @property
     def feeds(self) -> Array:

@@ -34,6 +34,7 @@ class Toolpath:
         bulge: Largest distance in [m] of a smooth curve from the straight lines between its points, before it is
             projected; None for other curves.
         seam: The seam with its walls by the parameter of the tip curve; None without walls.
+        listed: The same by the points and axes that a file lists, where the path was smoothed; else None.
         line: Curve that the tip weaves about, along which length and feed are measured; None where it does not weave.
     """
 
@@ -50,6 +51,7 @@ class Toolpath:
     bulge: float | None = None
     seam: SeamPlaces | None = None
     line: Curve | None = None
+    listed: "Toolpath | None" = None
 
     def __repr__(self) -> str:
         """One line without arrays."""

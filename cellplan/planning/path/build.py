@@ -1,5 +1,6 @@
 """Toolpaths: from a task as written to tool poses on the part."""
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -54,7 +55,7 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
         InputError: The path cannot be drawn, misses the part, runs over an edge, leaves the tool's turn open, or is to
             be gone through again and does not come back to its start.
     """
-    outline = programmed_curve(task.path) if isinstance(task.path, ProgrammedPath) else path_curve(task)
+    outline = _outline(task)
     refuse_path_in_metres(outline.curve, task=task, part=part)
     curve, orientation = with_runs(task, *_with_tool(task, project_path(outline, task, part)))
     arc = measure(curve.curve)
@@ -88,7 +89,21 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
     )
     if not is_rigid(toolpath.spread(PROBES)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")
-    return toolpath
+    return replace(toolpath, listed=_as_listed(task, toolpath))
+
+
+def _outline(task: Task) -> PathCurve:
+    """The curve of a path before it is projected."""
+    return programmed_curve(task.path) if isinstance(task.path, ProgrammedPath) else path_curve(task)
+
+
+def _as_listed(task: Task, toolpath: Toolpath) -> Toolpath | None:
+    """A smoothed path by the points of its file, at the same parameters; None for another one."""
+    if not isinstance(task.path, SampledPath) or task.path.smoothing is None:
+        return None
+    by_file = replace(task, path=task.path.listed)
+    curve, orientation = _with_tool(by_file, _outline(by_file))
+    return replace(toolpath, tip=curve.curve, orientation=orientation)
 
 
 def _with_tool(task: Task, path: PathCurve) -> tuple[PathCurve, Orientation]:

@@ -18,6 +18,7 @@ from cellplan.geometry.curves.curve import (
     smooth_through,
     straight_sides,
     tangents,
+    turns,
 )
 from cellplan.geometry.curves.seam_line import SeamLine, SeamPlaces
 from cellplan.geometry.curves.spline import spline_through
@@ -84,7 +85,8 @@ def path_curve(task: Task) -> PathCurve:
         case SampledPath():
             _refuse_poor_points(path.points, path.is_closed, where=where, path=path)
             points = _closed(path.points, path.is_closed)
-            return _smooth(points, path.is_closed) if path.is_smooth else _sides(points, task)
+            given = chord_lengths(_closed(path.listed.points, path.is_closed))
+            return _smooth(points, given, path.is_closed) if path.is_smooth else _sides(points, task)
         case TimedPath():
             refuse_near_times(path, where)
             return _timed(path)
@@ -167,9 +169,8 @@ def _closed(points: Array, is_closed: bool) -> Array:
     return np.vstack([points, points[:1]]) if is_closed else points
 
 
-def _smooth(points: Array, is_closed: bool) -> PathCurve:
-    """Smooth curve through points; a closed one passes its start smoothly."""
-    given = chord_lengths(points)
+def _smooth(points: Array, given: Array, is_closed: bool) -> PathCurve:
+    """Smooth curve through points at parameters, shape (N,); a closed one passes its start smoothly."""
     breaks = np.zeros(len(points), dtype=bool)
     breaks[[0, -1]] = not is_closed
     curve = smooth_through(given, points, breaks=breaks)
@@ -256,14 +257,6 @@ def _refuse_hidden_sides(points: Array, direction: Array, where: str) -> None:
             f"{where}: expected sides across the projection from {direction_name(direction)}, but the side from "
             f"{in_mm(points[k])} to {in_mm(points[k + 1])} runs along it"
         )
-
-
-def turns(points: Array) -> Array:
-    """Change of direction in [rad] at each inner point of straight sides, shape (N - 2,)."""
-    sides = np.diff(points, axis=0)
-    t = sides / np.linalg.norm(sides, axis=1, keepdims=True)
-    sine = np.linalg.norm(np.cross(t[:-1], t[1:]), axis=1)
-    return np.arctan2(sine, np.sum(t[:-1] * t[1:], axis=1))
 
 
 def _refuse_blend(corners: Array, angles: Array, blend: float, where: str) -> None:

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array, Flags
-from cellplan.geometry.curves.curve import BezierCurve, chord_lengths, rounded_lines
+from cellplan.geometry.arrays import Array
+from cellplan.geometry.curves.curve import BezierCurve, chord_lengths, rounded_lines, turns
 from cellplan.model.task.task import ProgrammedPath
-from cellplan.planning.path.curve import STRAIGHT_ON, PathCurve, turns
+from cellplan.planning.path.curve import STRAIGHT_ON, PathCurve
 
 
 def programmed_curve(path: ProgrammedPath) -> PathCurve:
     """Straight sides that stop at sharp corners and where the process is switched, all other corners rounded."""
-    given, is_stop = chord_lengths(path.points), np.concatenate([[True], _inner_stops(path), [True]])
+    given, is_stop = chord_lengths(path.listed.points), np.concatenate([[True], path.inner_stops, [True]])
     curve = with_programmed_corners(path, path.points)
     return PathCurve(curve=curve, stops=given[is_stop], given=given, is_closed=False)
 
@@ -21,15 +21,10 @@ def with_programmed_corners(path: ProgrammedPath, values: Array) -> BezierCurve:
     A corner is rounded as `rounded_sides` does it, from as far before it as keeps the tip within ``path.rounding`` of
     the corner, at most from the middle of the shorter side.
     """
-    given = chord_lengths(path.points)
+    given = chord_lengths(path.listed.points)
     width = np.diff(given)
-    change = 2.0 * np.sin(0.5 * turns(path.points))  # length of the change of direction
+    change = 2.0 * np.sin(0.5 * turns(path.listed.points))  # length of the change of direction
     within = 4.0 * path.rounding / np.maximum(change, STRAIGHT_ON)
     blends = np.minimum(within, 0.5 * np.minimum(width[:-1], width[1:]))
-    blends[_inner_stops(path)] = 0.0
+    blends[path.inner_stops] = 0.0
     return rounded_lines(given, values, np.diff(values, axis=0) / width[:, None], blends)
-
-
-def _inner_stops(path: ProgrammedPath) -> Flags:
-    """Whether the tool stops at each inner point, shape (N - 2,)."""
-    return (turns(path.points) > path.stop_angle) | np.diff(path.is_rapid)

@@ -29,7 +29,7 @@ def pace_of(task: Task, path: ProgrammedPath, toolpath: Toolpath) -> tuple[Array
         Times in [s] between the stretches, shape (S + 1,), lengths of path in [m] behind these, and their speeds.
     """
     process = task.process or ProcessEntry()
-    given, ramp = chord_lengths(path.points), process.ramp
+    given, ramp = chord_lengths(path.listed.points), process.ramp
     is_stop = np.isin(given, toolpath.stops)
     nodes = np.flatnonzero(is_stop | np.append(False, np.append(np.diff(path.speeds) != 0.0, False)))
     behind, feeds, is_on = toolpath.arc.lengths(given[nodes]), path.speeds[nodes[:-1]], ~path.is_rapid[nodes[:-1]]

@@ -80,6 +80,7 @@ def _rows(record: Record) -> Iterator[Row]:
     yield from _speed_rows(record["joints"])
     yield from acceleration_rows(record)
     yield from _task_rows(record["tasks"])
+    yield from smoothing_rows(record["tasks"])
     yield from feed_rows({name: task.get("greatest_feed") for name, task in record["tasks"].items()})
     yield from _closure_rows(record.get("closure", {}))
     yield from skew_row(record)
@@ -110,6 +111,21 @@ def _task_rows(tasks: Record) -> Iterator[Row]:
                 f"{task['path_bulge_mm']:.3g} mm",
                 f"from the sides between its points, task {name}",
             )
+
+
+def smoothing_rows(tasks: Record) -> Iterator[Row]:
+    """How smooth paths became, with the bound, and the errors against their files."""
+    for name, task in tasks.items():
+        if (smoothing := task.get("smoothing")) is None:
+            continue
+        for what in ("points", "axes"):
+            if (roughness := smoothing[what]) is not None and roughness["given"]:
+                smoothed, bound = (roughness[key] / roughness["given"] for key in ("smoothed", "bound"))
+                figure = f"{percent(smoothed, 1)} of the file's"
+                yield f"roughness of {what}", figure, f"at least {floored(100.0 * bound)} %, task {name}"
+        position, orientation = smoothing["max_position_error_mm"], smoothing["max_orientation_error_deg"]
+        figure = f"{_short(position)} mm, {_short(orientation)} deg"
+        yield "error against the file", figure, f"{small(smoothing['max_depth_mm'])} mm into the part, task {name}"
 
 
 def feed_rows(feeds: Record) -> Iterator[Row]:

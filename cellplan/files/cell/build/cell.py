@@ -28,7 +28,7 @@ from cellplan.model.cell.cell import Grasp, Mode, MotionSettings, Obstacle, Part
 from cellplan.model.cell.rod import Holder, Rod, tool_body_name
 from cellplan.model.origin import Origin
 from cellplan.model.robot.robot import BASE, Body, JointSum, RobotModel, configuration_in_si
-from cellplan.model.settings.task import ProcessEntry, tilt_of
+from cellplan.model.settings.task import ProcessEntry, ToleranceEntry, tilt_of
 from cellplan.model.settings.units import Mm, MmPerS, in_si, si_or_none
 from cellplan.model.task.task import (
     Frame,
@@ -159,7 +159,7 @@ def build_task(
         axes=_axis_numbers(entry.axes),
         is_spin_free="spin" in entry.free,
         tilt=tilt_of(entry.free),
-        tolerance=entry.tolerance.filled,
+        tolerance=_tracking_tolerance(entry),
         start=entry.begins_s,
         duration=entry.duration_s,
         **_speeds(entry, motion, fields["path"]),
@@ -182,6 +182,20 @@ def build_task(
         holder_moves=bool(entry.holder_moves),
         **_via_points(entry.via or ViaEntry(), models[entry.robot], document.robots[entry.robot]),
         origin=origin,
+    )
+
+
+def _tracking_tolerance(entry: TaskEntry) -> ToleranceEntry:
+    """What smoothing leaves of the tolerance of a task for the errors of its tool on the smoothed path."""
+    tolerance, smooth = entry.tolerance.filled, entry.path.smooth
+    if smooth is None:
+        return tolerance
+    position, direction = smooth.position_mm or 0.0, smooth.direction_deg or 0.0
+    return tolerance.changed(
+        position_mm=tolerance.position_mm - position,
+        between_rows_mm=(tolerance.between_rows_mm or tolerance.position_mm) - position,
+        orientation_deg=tolerance.orientation_deg - direction,
+        between_rows_deg=(tolerance.between_rows_deg or tolerance.orientation_deg) - direction,
     )
 
 

@@ -5,6 +5,7 @@ from typing import TypedDict
 
 import numpy as np
 
+from cellplan.files.cell.build.smoothed_path import smoothed
 from cellplan.files.schema.cell import CellDocument
 from cellplan.files.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
 from cellplan.files.schema.path import PathShapeEntry, PolylineEntry
@@ -44,7 +45,8 @@ def path_fields(name: str, document: CellDocument, read_targets: TargetReader) -
     """Geometry of a path, how the tool is held to walls and weaves, and its projection or place."""
     task = document.tasks[name]
     entry = task.path
-    path = _path(name, entry, read_targets)
+    axis = None if task.tool_axis in {None, "normal"} else direction(task.tool_axis)
+    path = _path(name, entry, read_targets, axis)
     is_placed = entry.outline is not None  # projected and held to the part already
     return PathFields(
         path=path,
@@ -56,15 +58,20 @@ def path_fields(name: str, document: CellDocument, read_targets: TargetReader) -
     )
 
 
-def _path(name: str, entry: PathShapeEntry, read_targets: TargetReader) -> PathSpec:
-    """Geometry of a path in [m]."""
+def _path(name: str, entry: PathShapeEntry, read_targets: TargetReader, tool_axis: Array | None) -> PathSpec:
+    """Geometry of a path in [m]; the axis is that of a tool whose file gives none."""
     if entry.circle is not None:
         return _circle(entry.circle)
     if entry.rectangle is not None:
         return _polygon(entry.rectangle, entry.rectangle.sides_mm, ((1, 1), (-1, 1), (-1, -1), (1, -1)))
     if entry.rhombus is not None:
         return _polygon(entry.rhombus, entry.rhombus.diagonals_mm, ((1, 0), (0, 1), (-1, 0), (0, -1)))
-    return read_targets(name) if entry.polyline is None else _polyline(entry.polyline)
+    if entry.polyline is not None:
+        return _polyline(entry.polyline)
+    path = read_targets(name)
+    if entry.smooth is None or not isinstance(path, SampledPath):
+        return path
+    return smoothed(path, entry.smooth, tool_axis)
 
 
 def _circle(entry: CircleEntry) -> CirclePath:

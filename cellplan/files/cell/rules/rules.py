@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
+from cellplan.files.cell.rules.smooth_rules import smooth_findings
 from cellplan.files.cell.rules.solver_rules import accurate_findings, feedback_findings
 from cellplan.files.input.findings import Finding, KeyPath, unknown_name
 from cellplan.files.schema.cell import CycleEntry
@@ -194,6 +195,7 @@ def target_findings(valid: ValidEntries, targets: Targets, document: YamlDocumen
         task = valid.tasks[name]
         if not isinstance(path, SeamLine):
             yield from _axes(task, path, document, name)
+            yield from smooth_findings(name, task, path, document)
         if isinstance(path, TimedPath):
             yield from _clock(task, document, name)
             yield from _end(task, path, valid, document=document, name=name)

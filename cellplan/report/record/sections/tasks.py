@@ -14,6 +14,7 @@ from cellplan.model.task.path_direction import run_direction
 from cellplan.model.task.task import Task
 from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import AXES, Number, Record, entry_record, number
+from cellplan.report.record.sections.smoothing import SmoothedRecord, smoothed_record
 from cellplan.report.record.sections.tool_errors import BetweenRowsRecord, between_record, by_axis, largest, mean_length
 
 AS_LISTED: Final = "as listed"
@@ -127,6 +128,7 @@ class TaskRecord(
     RapidsRecord,
     TiltRecord,
     GreatestRecord,
+    SmoothedRecord,
     PhaseOfTask,
 ):
     """Tool error of a task, desired minus actual, over the components that the task constrains."""
@@ -205,6 +207,7 @@ def _task_record(
         **_rapids_record(accuracy),
         **_tilt_record(accuracy, task),
         **_greatest_record(report, task),
+        **smoothed_record(accuracy.listed, task),
         **_phase_of(report),
         **direction_record(task),
         **between_record(accuracy.between),
