@@ -15,7 +15,8 @@ from cellplan.model.task.smoothing import Roughness, Smoothing
 from cellplan.model.task.task import ProgrammedPath, SampledPath
 
 PROBES: Final = 9  # places of each span at which a curve is held against that of the file
-ROUNDS: Final = 4  # with a narrower tube where the curve between points leaves it
+ROUNDS: Final = 6  # with a narrower tube where the curve between points leaves it
+MORE: Final = 1.5  # [-] of the depth between points by which that of the points is made less
 LEAST_SIDE: Final = 1e-9  # [m] of a path that can be smoothed; a shorter side is refused where the path is drawn
 
 
@@ -67,30 +68,33 @@ class _Chain:
 
     def with_points(self, normals: Array | None, radius: float, into: float) -> tuple[Array, Roughness]:
         """Points within a radius in [m] of those of the file, and within ``into`` along normals, shape (N, 3)."""
-        points, within, depth = self._path.points, radius, into
+        points, within, depth, least = self._path.points, radius, into, 0.0
         for _ in range(ROUNDS):
             tube = Tube.of_positions(normals, len(points), radius=within, into=depth)
             values, bound = smoothest(points, self._differences, tube, fixed=self._fixed)
+            least = bound if (within, depth) == (radius, into) else least
             off = self._between(values - points)
             most = float(np.linalg.norm(off, axis=1).max())
             deepest = -np.inf if normals is None else float(np.sum(off * self._between(normals), axis=1).max())
             if most <= radius and deepest <= into:
                 break
             within *= min(1.0, radius / most)
-            depth = max(depth - max(0.0, deepest - into), -0.5 * within)
-        return values, self._roughness(points, values, bound)
+            depth = max(depth - MORE * max(0.0, deepest - into), -0.5 * within)
+        values = points + min(1.0, radius / most) * (values - points)
+        return values, self._roughness(points, values, least)
 
     def with_axes(self, axes: Array, angle: float) -> tuple[Array, Roughness]:
         """Unit axes within an angle in [rad] of those of the file."""
-        within = angle
+        within, least = angle, 0.0
         for _ in range(ROUNDS):
             values, bound = smoothest(axes, self._differences, Tube.of_axes(axes, angle=within), fixed=self._fixed)
-            values = _unit(values)
+            values = np.where(self._fixed[:, None], axes, _unit(values))
+            least = bound if within == angle else least
             most = float(_angles(_unit(self._between(values)), _unit(self._between(axes))).max())
             if most <= angle:
                 break
             within *= angle / most
-        return values, self._roughness(axes, values, bound)
+        return values, self._roughness(axes, values, least)
 
     def _roughness(self, listed: Array, values: Array, bound: float) -> Roughness:
         of = self._differences.roughness
