@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -11,9 +12,12 @@ from cellplan.model.cell.cell import RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Check
 from cellplan.model.report.smoothing import ListedErrors
+from cellplan.model.task.clocked_path import ClockedPath
 from cellplan.model.task.task import SampledPath, Task
 from cellplan.model.units import DEG, MM
 from cellplan.scene.kinematics.screw_chain import Chains
+
+SAME_LENGTH: Final = 1e-9  # [m] rounding of lengths
 
 
 def listed_errors(schedule: Schedule, chains: Chains, q: RobotRows, X_WP: Array) -> dict[str, ListedErrors]:
@@ -26,9 +30,9 @@ def listed_errors(schedule: Schedule, chains: Chains, q: RobotRows, X_WP: Array)
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """
     errors: dict[str, ListedErrors] = {}
-    for path in schedule.paths:
+    for path, scheduled in zip(schedule.paths, schedule.tasks, strict=False):
         task, listed = path.task, path.toolpath.listed
-        on_path = (schedule.times >= task.judged_from) & _within(schedule, path.start, path.end)
+        on_path = (schedule.times >= task.judged_from) & _on_file(schedule, path, scheduled.travelled)
         if listed is None or not np.any(on_path):
             continue
         X_PT = relative_to_task_frame(task, chains[task.robot].tool_poses(q[task.robot]), X_WP)[on_path]
@@ -65,10 +69,13 @@ def check_listed(task: Task, errors: ListedErrors | None) -> Iterator[Check]:
         yield _check("listed_depth", task.name, depth, limit=MM * smoothing.into + tracking, unit="mm")
 
 
-def _within(schedule: Schedule, begin: float, end: float) -> Flags:
-    """Which rows have a nominal time from a begin to an end, shape (N,)."""
+def _on_file(schedule: Schedule, path: ClockedPath, travelled: Array) -> Flags:
+    """Which rows are on a path, but for its runs, of which its file says nothing, shape (N,)."""
     nominal = schedule.times if schedule.clock is None else schedule.clock.sigma
-    return (nominal >= begin) & (nominal <= end)
+    run_in, run_out = (0.0, 0.0) if path.task.process is None else path.task.process.runs
+    end = path.task.repeat * path.toolpath.length - run_out
+    on_path = (nominal >= path.start) & (nominal <= path.end)
+    return on_path & (travelled >= run_in - SAME_LENGTH) & (travelled <= end + SAME_LENGTH)
 
 
 def _check(name: str, task: str, worst: tuple[float, float], *, limit: float, unit: str) -> Check:

@@ -19,7 +19,7 @@ from cellplan.model.settings.entry import (
     rule,
     setting,
 )
-from cellplan.model.settings.units import Mm, Within
+from cellplan.model.settings.units import Deg, Mm, Within
 
 COEFFICIENT_LIMIT: Final = 400  # more are a table of the motion, not a spline
 
