@@ -29,6 +29,7 @@ from cellplan.files.cell.build.path import is_woven_by_controller
 from cellplan.files.cell.build.srdf import apply_srdfs
 from cellplan.files.cell.changes import changed, plain_values
 from cellplan.files.cell.expansion import is_of_entry, with_values
+from cellplan.files.cell.face_rasters import raster_paths
 from cellplan.files.cell.layout.build_layout import read_layout
 from cellplan.files.cell.names import with_stated_names
 from cellplan.files.cell.open_tasks import open_task_findings, open_tasks, unknown_robot_findings, with_first_robots
@@ -252,7 +253,12 @@ def _targets(valid: ValidEntries, sources: Sources, part: StepPart | None) -> Ta
         if task.path.file_key is not None
     }
     read: Targets = {name: path for name, path in samples.items() if path is not None}
-    return {**read, **edge_lines(valid, sources), **outline_paths(valid, sources, part)}
+    of_part: Targets = {
+        **edge_lines(valid, sources),
+        **raster_paths(valid, sources),
+        **outline_paths(valid, sources, part),
+    }
+    return {**read, **of_part}
 
 
 def _unknown_bodies(valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:

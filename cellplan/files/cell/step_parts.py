@@ -54,7 +54,7 @@ def load_step_part(place: Path, entry: StepEntry) -> tuple[StepPart, str]:
     Raises:
         InputError: The extra ``step`` is not installed, or the file cannot be read; see `read_step_part`.
     """
-    return _read(read_step_part, place, entry.file, entry.shape, entry.deviation_mm.si)
+    return read_of_step(read_step_part, place, entry.file, entry.shape, entry.deviation_mm.si)
 
 
 def load_drawing(place: Path, file: str, shape: str | None, gap: float) -> StepDrawing:
@@ -63,16 +63,18 @@ def load_drawing(place: Path, file: str, shape: str | None, gap: float) -> StepD
     Raises:
         InputError: The extra ``step`` is not installed, or the file cannot be read.
     """
-    return _read(read_drawing, place, file, shape, gap)[0]
+    return read_of_step(read_drawing, place, file, shape, gap)[0]
 
 
-def _read(read: Callable[..., Value], place: Path, file: str, shape: str | None, size: float) -> tuple[Value, str]:
+def read_of_step(
+    read: Callable[..., Value], place: Path, file: str, shape: str | None, request: Hashable
+) -> tuple[Value, str]:
     """What a function reads of a STEP file, and the SHA-256 of the file; what was read last is not read again."""
     require_step(file)
     digest = digest_of_file(place, file=file)
     guard = Guard(file=file, worker="the STEP reader", megabytes=MEGABYTES)
-    key = (read, digest, file, shape, size)
-    return remembered(key, lambda: in_child(read, place, file, shape, size, guard=guard)), digest
+    key = (read, digest, file, shape, request)
+    return remembered(key, lambda: in_child(read, place, file, shape, request, guard=guard)), digest
 
 
 def remembered(key: Hashable, read: Callable[[], Value]) -> Value:

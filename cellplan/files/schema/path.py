@@ -6,6 +6,7 @@ from pydantic import Field, Tag, model_validator
 
 from cellplan.files.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
 from cellplan.files.schema.programmed import MOST_JOINED_MM, CamChoice, GcodeChoice, OutlineChoice
+from cellplan.files.schema.raster import RasterEntry
 from cellplan.model.settings.entry import (
     FARTHEST_MM,
     Angle,
@@ -130,6 +131,7 @@ class PathShapeEntry(OneOf):
         "edge",
         "edges",
         "outline",
+        "face",
         *OF_FILES,
     )
 
@@ -161,6 +163,12 @@ class PathShapeEntry(OneOf):
         "lists them. The origin of the drawing is the foot of that of the part frame, its x axis +x of the part frame "
         "along the face (+y on a face across x), and it is seen from outside; see outline.at.",
     )
+    face: Text | None = setting(
+        None,
+        "Face of the STEP file of the part (`part.step`) by name, covered by a raster, the tool against its normal; "
+        "`cellplan seams` lists them.",
+    )
+    raster: RasterEntry | None = setting(None, "Lines of a raster; required with face.")
     csv: CsvChoice | None = setting(None, "Tool targets from a file.")
     apt: CamChoice | None = setting(None, "Tool targets, feeds and rapids from a file of APT or CLDATA.")
     gcode: GcodeChoice | None = setting(
@@ -193,6 +201,11 @@ class PathShapeEntry(OneOf):
             raise rule("unexpected key, only a path of a file (csv, apt, gcode) is smoothed", "smooth")
         if self.smooth is not None and self.project is not None:
             raise rule("unexpected key, a projected path takes its points and normals from the part", "smooth")
+        if (self.face is None) != (self.raster is None):
+            text = "missing, expected how the face is rastered: {step_mm: 20}"
+            raise rule(text if self.raster is None else "unexpected key, it covers a face", "raster")
+        if self.face is not None and self.project is not None:
+            raise rule("unexpected key, a face lies on the part already", "project")
         if not self.is_edge and self.start_at_mm is not None:
             raise rule("unexpected key, only edges that are closed begin anywhere", "start_at_mm")
         return self
@@ -230,12 +243,12 @@ class PathShapeEntry(OneOf):
     @property
     def is_programmed(self) -> bool:
         """Whether it has rapids and stops of its own."""
-        return self.has_feeds or self.outline is not None
+        return self.has_feeds or self.outline is not None or self.raster is not None
 
     @property
     def is_on_part(self) -> bool:
-        """Whether it lies on the part, which holds the tool upright or has walls: edges and outlines."""
-        return self.is_edge or self.outline is not None
+        """Whether it lies on the part, which holds the tool upright or has walls: edges, outlines and rasters."""
+        return self.is_edge or self.outline is not None or self.raster is not None
 
     @property
     def is_edge(self) -> bool:

@@ -32,6 +32,7 @@ Length = Annotated[Mm, Within(gt=0.0, le=FARTHEST_PART_MM)]
 Dwell = Annotated[float, Field(ge=0.0, le=10.0)]
 WeaveSide = Annotated[Mm, Within(gt=0.0, le=FARTHEST_MM)]
 OF_OUTLINES: Final = ("work_deg", "push_deg", "drag_deg", "standoff_mm", "reverse")  # keys of a seam that they have
+OF_RASTERS: Final = ("standoff_mm",)
 OF_FEED: Final = ("frequency_hz", "dwell_left_s", "dwell_right_s")  # keys whose lengths follow from the feed
 
 
@@ -150,12 +151,15 @@ class PathEntry(PathShapeEntry):
     )
 
     @model_validator(mode="after")
-    def _suits_outline(self) -> Self:
-        """How a tool is held along an outline follows from the normal of the part alone."""
-        for key in self.seam_keys if self.outline is not None else ():
-            if key not in OF_OUTLINES:
-                allowed = ", ".join(OF_OUTLINES)
-                raise rule(f"unexpected key, an outline has {allowed}; it is run as it is drawn", key)
+    def _suits_part(self) -> Self:
+        """How a tool is held along an outline or a raster follows from the normal of the part alone."""
+        allowed = OF_OUTLINES if self.outline is not None else OF_RASTERS
+        for key in self.seam_keys if self.outline is not None or self.raster is not None else ():
+            if key not in allowed:
+                what = (
+                    f"an outline has {', '.join(allowed)}" if self.outline is not None else "a raster has standoff_mm"
+                )
+                raise rule(f"unexpected key, {what}; it is run as it is drawn", key)
         return self
 
     @model_validator(mode="after")
@@ -224,7 +228,9 @@ class PathEntry(PathShapeEntry):
         """Whether the tool is held to walls."""
         of_walls = self.walls, self.from_, self.toward
         distances = self.standoff_mm, self.side_mm, self.out_mm, self.rod_from_walls_mm
-        return any(it is not None for it in (*of_walls, *distances, self.work_deg, self.push_deg, self.drag_deg))
+        return self.raster is None and any(
+            it is not None for it in (*of_walls, *distances, self.work_deg, self.push_deg, self.drag_deg)
+        )
 
     @property
     def wall_names(self) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ from cellplan.model.settings.task import (
     TorchEntry,
     WeldPositionEntry,
 )
-from cellplan.model.settings.units import Deg, Mm, Within
+from cellplan.model.settings.units import Deg, Mm, MmPerS, Within
 from cellplan.model.units import MM
 
 EXCLUDED_BY_PROCESS: Final = ("duration_s", "feed_mm_s", "time_law", "settle_s")
@@ -313,6 +313,8 @@ class TaskEntry(Entry):
         """A file that states feeds decides how fast the tool moves; a path with rapids has stops of its own."""
         if self.path.outline is not None and self.process is None:
             raise rule("missing, expected the feed along an outline, such as {feed_mm_s: 20}", "process")
+        if self.path.raster is not None and not isinstance(self.process and self.process.feed_mm_s, MmPerS):
+            raise rule("expected a process with a stated feed along a raster, such as {feed_mm_s: 100}", "process")
         by = "file of the path states the feeds" if self.path.has_feeds else "process has the feed"
         for key in EXCLUDED_BY_FILE if self.path.is_programmed else ():
             if getattr(self, key):

@@ -17,6 +17,7 @@ from cellplan.geometry.arrays import Array, Flags, Indices
 MM: Final = 1e3  # [mm/m]
 ON_FACE: Final = 1e-5  # [mm] a point this near to the border of a face is on it
 NO_STEP: Final = "expected the package cadquery-ocp-novtk, got none: pip install 'cellplan[step]'"
+NEAREST: Final = 1e-7  # [mm] of the nearest point of a surface
 SPREAD: Final = 9  # points of an edge that stand for it
 LENGTH_TOL: Final = 1e-9  # [mm] of the length of a curve
 FACET_ANGLE: Final = 0.35  # [rad] between neighbouring facets: a small hole stays round
@@ -60,9 +61,23 @@ class Face:
         BRepGProp.SurfaceProperties_s(self.shape, properties)
         return float(properties.Mass()) / MM**2
 
-    def project(self, points: Array) -> tuple[Array, Array, Array]:
-        """Parameters, shape (N, 2), nearest points on the whole surface and outward normals there, shape (N, 3)."""
-        from OCP.gp import gp_Pnt
+    @cached_property
+    def middle(self) -> Array:
+        """Centre of the area in [m], shape (3,); of a curved face it lies off the surface."""
+        from OCP.BRepGProp import BRepGProp
+        from OCP.GProp import GProp_GProps
+
+        properties = GProp_GProps()
+        BRepGProp.SurfaceProperties_s(self.shape, properties)
+        centre = properties.CentreOfMass()
+        return np.array([centre.X(), centre.Y(), centre.Z()]) / MM
+
+    def project(self, points: Array, near: Array | None = None) -> tuple[Array, Array, Array]:
+        """Parameters, shape (N, 2), nearest points on the whole surface and outward normals there, shape (N, 3).
+
+        With parameters near those of the points, shape (N, 2), a surface of splines is searched from there.
+        """
+        from OCP.gp import gp_Pnt, gp_Pnt2d
 
         if self._plane is not None:
             origin, axes = self._plane[0], self._plane[1:]
@@ -71,7 +86,10 @@ class Face:
             return uv, feet, np.tile(self._sign * axes[2], (len(points), 1))
         uv = np.empty((len(points), 2))
         for index, (x, y, z) in enumerate(MM * points):
-            place = self._analysis.ValueOfUV(gp_Pnt(x, y, z), 1e-7)
+            if near is None:
+                place = self._analysis.ValueOfUV(gp_Pnt(x, y, z), NEAREST)
+            else:
+                place = self._analysis.NextValueOfUV(gp_Pnt2d(*near[index]), gp_Pnt(x, y, z), NEAREST)
             uv[index] = place.X(), place.Y()
         feet, normals = self.at(uv)
         return uv, feet, normals
@@ -88,6 +106,15 @@ class Face:
             normals[index] = du.Crossed(dv).XYZ().X(), du.Crossed(dv).Y(), du.Crossed(dv).Z()
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         return feet, self._sign * normals / np.where(length > 0.0, length, 1.0)
+
+    def border(self) -> list["Edge"]:
+        """Edges round the face and round its holes, and those along which a closed surface meets itself."""
+        from OCP.BRep import BRep_Tool
+        from OCP.TopAbs import TopAbs_EDGE
+        from OCP.TopoDS import TopoDS
+
+        shapes = [TopoDS.Edge(shape) for shape in explored(self.shape, TopAbs_EDGE)]
+        return [Edge(shape, (0, 0), (1.0, 1.0)) for shape in shapes if not BRep_Tool.Degenerated_s(shape)]
 
     def holds(self, uv: Array) -> Flags:
         """Whether points at parameters, shape (N, 2), lie within the border of the face or on it, shape (N,)."""

@@ -148,7 +148,8 @@ def needs_surface(task: TaskEntry) -> bool:
 
 def _tool_axis(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A normal needs a surface; of a file it is known only later whether it brings orientations."""
-    if needs_surface(task) and task.path.project is None and not (task.path.file_key or task.path.on):
+    is_laid = task.path.file_key or task.path.on or task.path.raster
+    if needs_surface(task) and task.path.project is None and not is_laid:
         cure = "give tool_axis a direction"
         if task.relative_to == "part":
             cure = f"add project: +z (or another side), or {cure}"
