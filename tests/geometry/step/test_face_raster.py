@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 from builders.step_files import Named, box, cut, cylinder, write_step
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere, BRepPrimAPI_MakeTorus
+from OCP.collections import Array2_gp_Pnt
+from OCP.GeomAbs import GeomAbs_C2
+from OCP.GeomAPI import GeomAPI_PointsToBSplineSurface
 from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_SOLID
 
@@ -135,6 +139,30 @@ def test_lines_on_a_saddle_of_a_torus_are_a_step_apart_across_them() -> None:
         sides = np.concatenate([a + np.linspace(0.0, 1.0, 50)[:, None] * (b - a) for a, b in pairwise(other)])
         apart = np.linalg.norm(one[len(one) // 2] - sides, axis=1).min()
         assert apart == pytest.approx(0.01, rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("direction", [0.0, 0.6])
+def test_lines_on_a_wavy_surface_of_splines_are_a_step_apart_along_it(direction: float) -> None:
+    points = Array2_gp_Pnt(1, 12, 1, 12)
+    for row, column in np.ndindex(12, 12):
+        x, y = 20.0 * row, 15.0 * column
+        points.SetValue(row + 1, column + 1, gp_Pnt(x, y, 40.0 * np.sin(x / 90.0) * np.cos(y / 70.0)))
+    surface = GeomAPI_PointsToBSplineSurface(points, 3, 8, GeomAbs_C2, 1e-3).Surface()
+    face = Face(BRepBuilderAPI_MakeFace(surface, 1e-6).Face())
+
+    lines = [line for line in lines_of(raster(face, settings(direction=direction))) if len(line) > 2]
+
+    apart = []
+    for one, other in pairwise(lines):
+        sides = np.concatenate([a + np.linspace(0.0, 1.0, 30)[:, None] * (b - a) for a, b in pairwise(other)])
+        for point in one[2:-2:6]:
+            k = int(np.argmin(np.linalg.norm(sides - point, axis=1)))
+            if 40 <= k < len(sides) - 40:  # no end of a line
+                _, feet, _ = face.project(point + np.linspace(0.0, 1.0, 40)[:, None] * (sides[k] - point))
+                apart.append(np.linalg.norm(np.diff(feet, axis=0), axis=1).sum())
+    assert len(apart) > 30
+    np.testing.assert_allclose(apart, 0.02, rtol=0.01)
 
 
 @pytest.mark.parametrize(
