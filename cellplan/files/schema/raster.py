@@ -25,7 +25,7 @@ class RasterEntry(ProgrammedEntry):
     )
     overlap_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_MM)] = setting(
         Mm(0.0),
-        "Distance by which each line goes on past the border with the process on, straight on; over holes and gaps "
+        "Distance by which each line goes on past the border with the process on, ever less bent; over holes and gaps "
         "along the face, the narrower ones wholly with the process on.",
     )
     lead_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_MM)] = setting(

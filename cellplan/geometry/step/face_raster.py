@@ -15,6 +15,7 @@ from cellplan.geometry.step.drawing import names_of_faces
 from cellplan.geometry.step.kernel import MM, Face
 from cellplan.geometry.step.parallels import CURE, Chart, border_of, chart_of
 from cellplan.geometry.step.reader import read_solids
+from cellplan.geometry.transforms import rotation_about
 
 ROUNDING: Final = 1e-6  # [-] of a step by which the width of a face may be more than a whole number of them
 SHORTEST: Final = 1e-3  # [m] of a stretch of a line
@@ -25,6 +26,8 @@ MOST_SIDES: Final = 20_000  # of a stretch
 MOST_LINES: Final = 5_000
 WIDEST: Final = 4.0  # spacings of a chart between the first points of a stretch, before it is refined
 TINY: Final = 1e-30  # [m^2] no side is shorter
+LARGEST_BEND: Final = np.deg2rad(30.0)  # by which a line still bends beyond the border
+FLAT: Final = 1e-9  # [rad] a line that bends less is straight
 SLOPE: Final = 1e-3  # spacings of a chart over which the direction of a line is measured
 
 
@@ -225,20 +228,46 @@ def _line(chart: Chart, stretches: Sequence[_Line], settings: RasterSettings) ->
 
 
 def _beyond(chart: Chart, stretch: _Line, settings: RasterSettings) -> list[_Line]:
-    """Sides straight on from the end of a stretch: with the process on, then with it off."""
+    """What goes on from the end of a stretch, ever less bent: with the process on, then straight with it off."""
     begin, end = stretch.ends
     step = np.copysign(SLOPE * chart.spacing, end - begin)
-    around, _ = _tips(chart, np.array([end - step, end + step]), stretch.d, settings)
+    around, upright = _tips(chart, np.array([end - step, end + step]), stretch.d, settings)
     normal = stretch.normals[-1]
+    rate = np.cross(normal, (upright[1] - upright[0]) / np.linalg.norm(around[1] - around[0]))
     along = around[1] - around[0] - (around[1] - around[0]) @ normal * normal
     along /= np.linalg.norm(along)
-    sides, point = [], stretch.points[-1]
-    for length, is_off in ((settings.overlap, False), (settings.lead, True)):
-        if length > 0.0:
-            points = np.stack([point, point + length * along])
-            sides.append(_Line(stretch.d, (end, end), points, np.stack([normal, normal]), np.array([is_off])))
-            point = points[1]
-    return sides
+    parts, points, normals = list[_Line](), stretch.points[-1:], normal[None]
+    if settings.overlap > 0.0:
+        points, turns = _bending_out(along, rate, settings)
+        points, normals = stretch.points[-1] + points, turns @ normal
+        parts.append(_Line(stretch.d, (end, end), points, normals, np.zeros(len(points) - 1, dtype=bool)))
+        along = turns[-1] @ along
+    if settings.lead > 0.0:
+        points = points[-1] + np.outer([0.0, settings.lead], along)
+        parts.append(_Line(stretch.d, (end, end), points, normals[[-1, -1]], np.array([True])))
+    return parts
+
+
+def _bending_out(along: Array, rate: Array, settings: RasterSettings) -> tuple[Array, Array]:
+    """Points from the border on, shape (N, 3), and rotations of the tool since then, shape (N, 3, 3).
+
+    The tool goes on in a direction and turns at a rate in [rad/m], shape (3,), that falls evenly to zero, at the end or
+    where it has turned by ``LARGEST_BEND``: a line that is straight at once would turn the tool by jerks.
+    """
+    bend = float(np.linalg.norm(rate))
+    if bend * settings.overlap < FLAT:
+        return np.outer([0.0, settings.overlap], along), np.broadcast_to(np.eye(3), (2, 3, 3))
+    taper = min(settings.overlap, 2.0 * LARGEST_BEND / bend)
+    sides = int(np.ceil(max(taper * np.sqrt(bend / (8.0 * settings.chord)), taper * bend / LARGEST_TURN)))
+    at = taper * np.arange(2 * sides + 1) / (2 * sides)
+    turns = rotation_about(rate / bend, bend * (at - at * at / (2.0 * taper)))
+    directions = turns @ along
+    steps = (directions[:-2:2] + 4.0 * directions[1::2] + directions[2::2]) * taper / (6.0 * sides)
+    points = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    if taper < settings.overlap:
+        points = np.concatenate([points, points[-1:] + (settings.overlap - taper) * directions[-1:]])
+        return points, np.concatenate([turns[::2], turns[-1:]])
+    return points, turns[::2]
 
 
 def _over(gap: _Line, overlap: float) -> _Line:
@@ -275,10 +304,12 @@ def _transfer(chart: Chart, one: _Line, other: _Line, settings: RasterSettings) 
         lengths, distances = (a + share * (b - a) for a, b in ((one.ends[1], other.ends[0]), (one.d, other.d)))
         return _tips(chart, lengths, distances, settings)
 
-    (first, middle, last), _ = tips(np.array([0.0, 0.5, 1.0]))
+    (first, middle, last), upright = tips(np.array([0.0, 0.5, 1.0]))
     bend = float(np.linalg.norm(middle - 0.5 * (first + last)))
     sides = 1 if chart.face.kind == "plane" else int(np.clip(np.ceil(np.sqrt(bend / settings.chord)), 1, MOST_SIDES))
     share = np.arange(1, sides) / sides
     points, normals = tips(share)
-    lateral = np.outer(1.0 - share, one.points[-1] - first) + np.outer(share, other.points[0] - last)
-    return _Line(one.d, (one.ends[1], other.ends[0]), points + lateral, normals, np.ones(max(sides - 2, 0), dtype=bool))
+    points += np.outer(1.0 - share, one.points[-1] - first) + np.outer(share, other.points[0] - last)
+    normals += np.outer(1.0 - share, one.normals[-1] - upright[0]) + np.outer(share, other.normals[0] - upright[-1])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return _Line(one.d, (one.ends[1], other.ends[0]), points, normals, np.ones(max(sides - 2, 0), dtype=bool))

@@ -85,6 +85,23 @@ def test_sides_of_lines_are_within_the_chord_also_at_a_distance_from_the_face() 
         assert (BALL + 0.1 - np.linalg.norm(middle - centre, axis=1)).max() <= 5e-5 + 1e-9
 
 
+def test_beyond_the_border_lines_bend_ever_less_so_that_the_tool_turns_without_a_jerk() -> None:
+    content = raster(face_of(dome(), "sphere"), settings(direction=0.7, overlap=0.04, chord=1e-6, step=0.1))
+
+    count = len(lines_of(content)[0])
+    line, normals = content.points[count // 2 : count], content.normals[count // 2 : count]
+    turns = np.linalg.norm(np.cross(normals[:-1], normals[1:]), axis=1)
+    sides = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    to_end = np.append(np.cumsum(sides[::-1])[::-1], 0.0)
+    middles = 0.5 * (to_end[:-1] + to_end[1:])
+    beyond = middles < 0.04
+    rates = np.where(beyond, middles / 0.04, 1.0) / BALL  # [rad/m] of a line that straightens evenly
+    assert 10 < beyond.sum() < len(beyond)
+    np.testing.assert_allclose(turns / sides, rates, atol=1e-2 / BALL)
+    assert turns[beyond].sum() == pytest.approx(0.04 / (2.0 * BALL), rel=1e-3)
+    assert np.abs(np.sum(np.diff(line, axis=0) * (normals[:-1] + normals[1:]), axis=1) / sides).max() < 1e-4
+
+
 def test_every_second_line_is_run_back_and_the_process_is_off_between_lines() -> None:
     content = raster(face_of(box((0, 0, 0), (200, 100, 10)), "plane"), settings(overlap=0.005, lead=0.03))
 
