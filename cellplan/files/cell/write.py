@@ -15,6 +15,7 @@ from cellplan.model.cell.cell import Cell, Part, Robot
 from cellplan.model.cell.sequence import sequence_of
 from cellplan.model.robot.robot import RobotModel, configuration_in_si, start_keys
 from cellplan.model.settings.solver import SolverEntry
+from cellplan.model.settings.task import ProcessEntry
 from cellplan.model.settings.units import Deg, Mm, file_number, in_si
 from cellplan.model.solver import Integrator
 from cellplan.model.task.task import ProgrammedPath, SampledPath, Task, TimedPath
@@ -111,6 +112,9 @@ def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
     written = {**entry, "start_s": task.start}
     if task.duration is not None:
         written["duration_s"] = task.duration
+    if task.process is not None and not task.process.scales:
+        process = {**entry["process"], "ramp_s": task.process.ramp}
+        written["process"] = {key: process[key] for key in ProcessEntry.model_fields if key in process}
     if isinstance(task.path, SampledPath | TimedPath) and not isinstance(task.path, ProgrammedPath):
         settings = {"file": task.path.source, "smooth": task.path.is_smooth, "closed": task.path.is_closed}
         if isinstance(task.path, SampledPath) and task.path.join:

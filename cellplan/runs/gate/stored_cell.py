@@ -88,7 +88,7 @@ def _with_file(stored: StoredRun, cell: Path, allow_dirs: Sequence[Path]) -> tup
         _refuse(stored, stale, details)
     if others:
         lines = (
-            f"{key_text(key)}: expected {shown_whole(old)} as in '{cell}', got {shown_whole(new)}"
+            f"{key_text(key)}: expected {shown_whole(old)} as in '{cell}', got {shown_whole(new)}; solve the cell again"
             for key, old, new in others
         )
         raise InvalidFileError([InputError(f"{stored.folder / CELL}: {line}") for line in lines])

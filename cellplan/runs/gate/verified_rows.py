@@ -127,7 +127,7 @@ def _refuse_other_report(stored: StoredRun, records: ProgramRecords, motions: Se
     findings = []
     for place, record in records.by_place.items():
         findings += [
-            f"{stored.file(place, 'report.json')}: {key}: expected {shown(new)}, got {shown(old)}"
+            f"{stored.file(place, 'report.json')}: {key}: expected {shown(new)}, got {shown(old)}; solve the cell again"
             for key, old, new in differences(stored.report(place), record, same_program=is_same)
         ]
     for motion in motions:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.files.cell.load import load_cell
-from cellplan.files.cell.write import as_written, render_cell
+from cellplan.files.cell.write import as_written, render_cell, written_document
 from cellplan.files.robots.joint_table import load_bundled
 from cellplan.files.yaml.reader import parse_yaml
 from cellplan.files.yaml.writer import yaml_text
@@ -112,6 +112,19 @@ def test_every_kind_of_entry_survives_being_written(load: Load, tmp_path: Path, 
 
     assert same(cell, again)
     assert render_cell(again) == render_cell(cell)
+
+
+def test_a_usual_ramp_is_written_as_if_it_were_stated(load: Load) -> None:
+    usual, stated, with_run_in = (
+        written_document(load(("tool_axis: normal", f"tool_axis: normal\n    process: {{feed_mm_s: 8{more}}}")))[
+            "tasks"
+        ]
+        for more in ("", ", ramp_s: 0.1", ", run_in_mm: 5")
+    )
+
+    assert yaml_text(usual) == yaml_text(stated)
+    assert all("ramp_s" in task["process"] for task in usual.values())
+    assert not any("ramp_s" in task["process"] for task in with_run_in.values())
 
 
 def test_planar_work_keeps_its_made_up_tool_axis(load: Load, tmp_path: Path) -> None:

@@ -230,7 +230,7 @@ def test_another_integrator_than_that_of_the_run_is_found_in_its_report(copy: Pa
     seal_again(copy / "run")
 
     assert refusal(copy / "run", copy / "cell" / "small.yaml") == (
-        f"{copy / 'run' / 'report.json'}: solver.integrator: expected 'accurate', got 'euler'"
+        f"{copy / 'run' / 'report.json'}: solver.integrator: expected 'accurate', got 'euler'; solve the cell again"
     )
 
 
