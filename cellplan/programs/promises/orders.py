@@ -275,8 +275,10 @@ def _off(cell: Cell, rows: ProgramRows, corners: Mapping[str, Array], count: int
 def order_finding(phase: str, bound: RegionBound, times: Array) -> str:
     """What is not clear in every order in a phase between two times in [s], shape (2,), as one line."""
     bodies = "" if bound.bodies is None else f" ({' and '.join(bound.bodies)})"
-    if not np.isfinite(bound.distance):
-        what = f"are proved to keep only {MM * min(bound.proved, bound.demand):.3g} mm"
+    if bound.distance > bound.demand:
+        measured = f", nearest measured {MM * bound.distance:.3g} mm" if np.isfinite(bound.distance) else ""
+        proved = np.floor(MM * MM * min(bound.proved, bound.demand)) / MM  # never more than is proved
+        what = f"are proved to keep only {proved:g} mm{measured}"
     else:
         what = f"come within {MM * bound.distance:.3g} mm"
     demanded = f"{MM * bound.demand:.3g} mm are demanded" if bound.demand > APART_TOL else "they must not touch"

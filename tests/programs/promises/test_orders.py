@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from builders.scene_builders import arm_model, body, joint, make_cell, placed, work
 
+from cellplan.certify.free_clocks.free_clocks import RegionBound
 from cellplan.errors import NotVerifiedError
 from cellplan.geometry.shapes import Sphere
 from cellplan.model.cell.cell import Grasp, Robot
 from cellplan.model.task.task import Frame
-from cellplan.programs.promises.orders import OrderStretch, PhaseSearch
+from cellplan.programs.promises.orders import OrderStretch, PhaseSearch, order_finding
 from cellplan.programs.promises.run_programs import RunPhase, RunProgram, spoilt_by_another_order
 from cellplan.scene.scene import Scene
 
@@ -145,3 +146,25 @@ def test_a_holder_must_stand_still_while_a_tool_is_in_process_on_the_part(frame:
 
 def _grasp(robot: str) -> Grasp:
     return Grasp(robot=robot, X_PT=np.eye(4))
+
+
+def test_what_is_not_proved_is_no_distance_that_is_measured() -> None:
+    bound = RegionBound(
+        first="a",
+        second="b",
+        bodies=("a/ball", "b/ball"),
+        distance=7.39e-3,
+        proved=4.9992e-3,
+        at=None,
+        is_met=False,
+        demand=5e-3,
+    )
+
+    unproved = order_finding("turn", bound, np.array([0.0, 1.0]))
+    near = order_finding("turn", replace(bound, distance=4.9e-3), np.array([0.0, 1.0]))
+    touching = order_finding("turn", replace(bound, distance=0.0, demand=0.0), np.array([0.0, 1.0]))
+
+    assert "are proved to keep only 4.999 mm, nearest measured 7.39 mm (a/ball and b/ball)" in unproved
+    assert "come within 4.9 mm" in near
+    assert "come within 0 mm" in touching
+    assert "they must not touch" in touching
