@@ -63,29 +63,31 @@ def _checked(options: CheckOptions, follow: "Callable[[Cell], None]", progress: 
     formats: list[str] = []
     if options.formats:
         from cellplan.programs.export.exporters import formats_for
-        from cellplan.programs.export.refusals import require_settings
+        from cellplan.programs.export.refusals import require_settings, settings_remarks
 
         formats = formats_for(options.formats)
     given = load_cell(options.cell, allow_dirs=options.allow_dirs)
     follow(given)
     named = given if options.controllers is None else with_names(given, options.controllers)
     changed = with_overrides(named, options.settings)
+    unwritten: list[tuple[str, str]] = []
     if formats:
         require_settings(changed, formats)
+        unwritten = settings_remarks(changed, formats)
     from cellplan.cli.next_steps import after_check
     from cellplan.jobs.check import check as check_cell
     from cellplan.jobs.check import check_lines
 
     result = check_cell(changed, progress=progress)
     status = ExitStatus.PASSED if result.passed else ExitStatus.CHECK_FAILED
-    record = _record(result) | ({"for": formats} if formats else {})
+    record = _record(result, unwritten) | ({"for": formats} if formats else {})
     steps = after_check(options.cell, changed, passed=result.passed, allow_dirs=options.allow_dirs)
     about = {"schema": options.schema, "status": record["status"], "exit": int(status)}
     return Result(status, [*check_lines(record), *steps], {**about, **record})
 
 
-def _record(result: "CellCheck") -> dict[str, Any]:
-    """The result in printed units."""
+def _record(result: "CellCheck", more: "list[tuple[str, str]]") -> dict[str, Any]:
+    """The result in printed units; ``more`` are further remarks with their keys."""
     from cellplan.report.record.common import check_record, number
     from cellplan.report.record.sections.clearance import left_out_record
     from cellplan.report.record.sections.rests_on import missing_tools, open_surfaces_record
@@ -94,7 +96,7 @@ def _record(result: "CellCheck") -> dict[str, Any]:
     from cellplan.report.text.notes import open_surface_notes
 
     open_surfaces = open_surfaces_record(result.cell)
-    remarks = [*result.cell.remarks, *open_surface_notes(open_surfaces), *missing_tools(result.cell)]
+    remarks = [*result.cell.remarks, *open_surface_notes(open_surfaces), *missing_tools(result.cell), *more]
     return {
         "cell": result.cell.name,
         "status": "passed" if result.passed else "failed",

@@ -18,7 +18,7 @@ from cellplan.programs.elements.handshake import require_signals
 from cellplan.programs.elements.timed_rows import cycle_of
 from cellplan.programs.export.choice import Choice, exported_robots, refuse_unknown_robots
 from cellplan.programs.export.exporters import EXPORTERS, exporter_of, refuse_choice
-from cellplan.programs.promises.promises import require_promise
+from cellplan.programs.promises.promises import require_promise, unstated_processes
 from cellplan.programs.promises.run_programs import holders_rest, program_names, run_programs
 from cellplan.programs.promises.stations import stations
 from cellplan.programs.rows.resample import lead_time
@@ -104,6 +104,14 @@ def require_settings(cell: Cell, formats: Iterable[str]) -> None:
                 cure = f"; state its id, and controllers of kind {listed(dialect.kinds)}" if is_bare else ""
                 missing.append(InputError(f"{cell.origin.at(key)}: for {form}: {text}{cure}"))
     raise_findings(missing)
+
+
+def settings_remarks(cell: Cell, formats: Iterable[str]) -> list[tuple[str, str]]:
+    """What programs in some formats would leave out though nothing is missing: keys of a cell, and a remark on each."""
+    linear = [EXPORTERS[form] for form in formats if form in EXPORTERS]
+    kinds = {kind for it in linear if isinstance(it, Dialect) and Moves.LINEAR in it.moves for kind in it.kinds}
+    robots = (it.name for it in cell.robots if it.control and cell.controllers[it.control.id].kind in kinds)
+    return list(unstated_processes(cell, robots))
 
 
 def default_folder(run: Path, form: str) -> Path:

@@ -1,6 +1,6 @@
 """Promises: what holds when controllers play the programs of a run, and why not more."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -285,16 +285,25 @@ def _unwritten(cell: Cell) -> Iterator[str]:
         yield f"no format writes the waits of {listed(names)}: program the marks of export.json there by hand"
 
 
+def unstated_processes(cell: Cell, robots: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Robots whose tasks have a process of which their controllers state no statement: key of these, and a remark."""
+    for robot in robots:
+        control = cell.robot(robot).control
+        has_process = any(task.robot == robot and task.process is not None for task in cell.tasks)
+        if control is not None and has_process and cell.controllers[control.id].process is None:
+            key = f"controllers.{control.id}.process"
+            yield key, f"no statement of a process is written for '{robot}': state {key}"
+
+
 def _processes(export: _Export) -> Iterator[str]:
     """Where a controller takes the speed of the tool from data of its own, and where no process is written."""
+    cell = export.run.cell
+    yield from (remark for _, remark in unstated_processes(cell, export.robots))
     for robot in export.robots:
-        control = export.run.cell.robot(robot).control
-        tasks = [task for task in export.run.cell.tasks if task.robot == robot and task.process is not None]
-        if control is None or not tasks:
-            continue
-        form = ProcessForm.of(export.run.cell.controllers[control.id])
+        control = cell.robot(robot).control
+        tasks = [task for task in cell.tasks if task.robot == robot and task.process is not None]
+        form = None if control is None else ProcessForm.of(cell.controllers[control.id])
         if form is None:
-            yield f"no statement of a process is written for '{robot}': state controllers.{control.id}.process"
             continue
         held = dict.fromkeys((form.feed_in(task.name), task.feed) for task in tasks if task.has_one_feed)
         for data, feed in held:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from builders.seam_jobs import seam_job
 
-from cellplan import open_gate
+from cellplan import load_cell, open_gate
 from cellplan.cli.main import run as run_command
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.jobs.recover.refusals import refuse_recovery, refuse_state
@@ -20,9 +20,11 @@ from cellplan.model.motion.plan import Hold
 from cellplan.model.report.exported import Moves, Promise
 from cellplan.model.report.verified_run import ReadRun
 from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry, KindName, RobotControlEntry
+from cellplan.model.settings.task import ProcessEntry
+from cellplan.model.settings.units import MmPerS
 from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.export.choice import Choice
-from cellplan.programs.export.refusals import refuse_unfit, refuse_unfit_run, unmet_demands
+from cellplan.programs.export.refusals import refuse_unfit, refuse_unfit_run, settings_remarks, unmet_demands
 
 NAMES = ("left", "right", "idle")
 
@@ -247,3 +249,18 @@ def test_programs_of_lines_pass_each_seam_once(form: str, read: ReadRun) -> None
     said = [str(error) for error in unmet_demands(read, DIALECTS[form], frame, Choice(moves=Moves.LINEAR))]
 
     assert any(text.startswith("program.cycles: expected 1,") for text in said) is (form != "fanuc_ls")
+
+
+def test_processes_of_which_no_statement_is_written_are_remarks(cells: Path) -> None:
+    cell = load_cell(cells / "in_turn.yaml")
+    with_process = replace(
+        cell, tasks=tuple(replace(task, process=ProcessEntry(feed_mm_s=MmPerS(8.0))) for task in cell.tasks)
+    )
+    control = cell.robot("abb").control
+    assert control is not None
+
+    (remark,) = settings_remarks(with_process, ["rapid", "csv"])
+
+    assert remark[0] == f"controllers.{control.id}.process"
+    assert "no statement of a process is written for 'abb'" in remark[1]
+    assert settings_remarks(with_process, ["csv"]) == settings_remarks(cell, ["rapid"]) == []
