@@ -219,7 +219,12 @@ def test_the_feed_holds_all_along_the_work_where_the_tool_runs_in_and_out(tmp_pa
             {"path.circle": None, "path.rectangle": {"sides_mm": [30, 30], "plane": "xy", "center_mm": [0, 120]}},
             "process.run_in_mm: expected a path without stops between its ends, got 3; round the corners",
         ),
+        ({"process.run_in_mm": 900}, "task 'ring', with its approach of 5 mm and its run-in of 900 mm ("),
         ({"process.run_in_mm": 900}, "out of reach, the best attempt leaves its tool tip 8"),
+        (
+            {"process.run_in_mm": 200, "process.run_out_mm": None},
+            "process.run_in_mm: expected less than half of the path and its run, 194.2 mm, as the ramp at its other",
+        ),
     ],
 )
 def test_runs_that_cannot_be_are_refused(tmp_path: Path, changes: dict[str, object], message: str) -> None:

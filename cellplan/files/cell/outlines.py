@@ -13,7 +13,7 @@ from cellplan.files.cell.paths.dxf import DrawingSettings, FlatDrawing, read_dra
 from cellplan.files.cell.referenced_files import Sources
 from cellplan.files.cell.step_parts import MEGABYTES, remembered
 from cellplan.files.input.files import digest_of_file
-from cellplan.files.input.findings import KeyPath, key_text
+from cellplan.files.input.findings import KeyPath, key_text, listed
 from cellplan.files.schema.partial import ValidEntries
 from cellplan.files.schema.programmed import OutlineEntry
 from cellplan.files.schema.task import TaskEntry
@@ -84,6 +84,10 @@ def _chosen(contours: Sequence[Contour], entry: OutlineEntry, task: TaskEntry) -
     numbers = entry.contours or range(1, len(contours) + 1)
     if max(numbers) > len(contours):
         raise InputError(f"expected contours up to {len(contours)}, as many as the layer has, got {max(numbers)}")
+    if len(set(numbers)) < len(numbers):
+        raise InputError(
+            f"expected every contour once, got {listed(map(str, numbers))}; write a task for a further time"
+        )
     chosen = [contours[number - 1] for number in numbers]
     if task.path.reverse:
         chosen = [contour.turned_back() for contour in chosen]

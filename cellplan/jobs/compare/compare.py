@@ -132,7 +132,8 @@ def files_of(job: CompareJob) -> Bundle:
 def evaluate_subject(job: CompareJob, variant: Variant) -> TrialOutcome:
     """Solve a cell or a mode of it, or read and verify a run.
 
-    A mode that has no solution from home to home is solved without these moves, and says that they are missing.
+    A mode that has no solution from home to home, or no starts for it, is solved without these moves, and says that
+    they are missing.
     """
     is_mode = len(job.subjects) == 1
     path = job.subjects[0 if is_mode else variant.number]
@@ -148,7 +149,7 @@ def evaluate_subject(job: CompareJob, variant: Variant) -> TrialOutcome:
         return solved_outcome(cell, figures=_solved_figures, file=path, task=job.task, folder=folder)
 
     whole = solved(variant.values if is_mode else {})
-    if whole.status is not TrialStatus.NO_SOLUTION or PROGRAM not in variant.values:
+    if whole.status not in (TrialStatus.NO_SOLUTION, TrialStatus.BAD_INPUT) or PROGRAM not in variant.values:
         return whole
     plain = solved({MODE: variant.values[MODE]})
     if not plain.figures:

@@ -7,7 +7,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.curves.extension import ExtendedCurve, ExtendedFrame, Extension
 from cellplan.geometry.curves.orientation import Orientation
-from cellplan.model.task.task import Task
+from cellplan.model.task.task import ProgrammedPath, Task
 from cellplan.planning.path.curve import PathCurve
 
 
@@ -15,12 +15,17 @@ def with_runs(task: Task, path: PathCurve, orientation: Orientation) -> tuple[Pa
     """The path with its runs, and the orientation, whose turning ends on them; both unchanged without any.
 
     Raises:
-        InputError: The tool stops on the path, weaves along it, follows walls, or goes through it several times.
+        InputError: The tool stops on the path or may, weaves along it, follows walls, or goes through it several times.
     """
     runs = (0.0, 0.0) if task.process is None else task.process.runs
     if not any(runs):
         return path, orientation
     where = task.where("process.run_in_mm" if runs[0] else "process.run_out_mm")
+    if isinstance(task.path, ProgrammedPath):
+        raise InputError(
+            f"{where}: expected none along a path with rapids and stops of its own, on which the tool begins at rest; "
+            "leave it out (a raster has overlap_mm, in which the tool comes to its feed)"
+        )
     if len(path.stops) > 2:
         raise InputError(
             f"{where}: expected a path without stops between its ends, got {len(path.stops) - 2}; round the corners "

@@ -124,9 +124,10 @@ def is_off(cell: Cell, relation: Relation, off: tuple[float, float]) -> bool:
 
 def off_words(cell: Cell, relation: Relation, off: tuple[float, float], *, at_best: str = "") -> str:
     """One line on a start off its task or grasp, in [m] and [rad]; ``at_best`` stands before the least of several."""
-    goal = f"the start of task '{relation.name}'"
     if isinstance(relation, Grasp):
         goal = f"its grasp on the part that '{cell.positioners[0]}' carries"
+    else:
+        goal = start_words(relation)
     position, orientation = _allowed(cell, relation)
     robot = cell.robot(relation.robot)
     cure = "`auto` finds a configuration" if _task_begun(cell, robot) is None else "without the key one is searched for"
@@ -135,6 +136,14 @@ def off_words(cell: Cell, relation: Relation, off: tuple[float, float], *, at_be
         f"{1e3 * off[0]:.3f} mm and {np.degrees(off[1]):.4f} deg from {goal}, allowed are {1e3 * position:g} mm and "
         f"{np.degrees(orientation):g} deg; {cure}"
     )
+
+
+def start_words(task: Task) -> str:
+    """The start of a task, with the approach and the run-in by which it lies before the path."""
+    approach = 0.0 if task.approach is None else task.approach.distance
+    run_in = 0.0 if task.process is None else task.process.runs[0]
+    parts = [f"its {what} of {1e3 * by:g} mm" for what, by in (("approach", approach), ("run-in", run_in)) if by > 0.0]
+    return f"the start of task '{task.name}'" + (f", with {' and '.join(parts)}" if parts else "")
 
 
 def _allowed(cell: Cell, relation: Relation) -> tuple[float, float]:

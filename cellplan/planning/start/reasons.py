@@ -14,7 +14,7 @@ from cellplan.model.cell.doubts import doubt_about
 from cellplan.model.robot.robot import Joint
 from cellplan.model.seeds import generator
 from cellplan.planning.start.branches import SEEDS, SEEDS_PER_HOLDER, StartSearch
-from cellplan.planning.start.given import off_words, start_place
+from cellplan.planning.start.given import off_words, start_place, start_words
 from cellplan.planning.start.inverse_kinematics import (
     finite_limits,
     on_nearest_turns,
@@ -233,7 +233,7 @@ def _goal_words(search: StartSearch, name: str) -> str | None:
     relation = next((relation for relation in search.cell.relations if relation.robot == name), None)
     if relation is None:
         return None
-    return "its grasp on the part" if isinstance(relation, Grasp) else f"the start of task '{relation.name}'"
+    return "its grasp on the part" if isinstance(relation, Grasp) else start_words(relation)
 
 
 def _shortfall(search: StartSearch, robot: Robot) -> str:

@@ -16,7 +16,7 @@ from cellplan.model.cell.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.motion.branches import SEED_SLIDE, SEED_TURN, MovedStart
 from cellplan.model.task.task import Frame, Task
 from cellplan.model.task.toolpath import Toolpath
-from cellplan.planning.start.given import is_off, part_pose, start_place, tool_distance, tool_error
+from cellplan.planning.start.given import is_off, part_pose, start_place, start_words, tool_distance, tool_error
 from cellplan.planning.start.inverse_kinematics import reaching_configurations
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
@@ -130,7 +130,7 @@ def _moved(relation: Relation, robot: Robot, q: Array, off: tuple[float, float],
 
 def _lost_words(cell: Cell, relation: Relation, robot: Robot, off: tuple[float, float], run: str) -> str:
     """One line on a branch of an earlier run that does not lead to a task or grasp."""
-    goal = f"its grasp '{relation.name}'" if isinstance(relation, Grasp) else f"the start of task '{relation.name}'"
+    goal = f"its grasp '{relation.name}'" if isinstance(relation, Grasp) else start_words(relation)
     return (
         f"{start_place(cell, robot)}: the branch of the run '{run}' leads '{robot.name}' to {goal} within the joint "
         f"limits by no way: its tool began {1e3 * off[0]:.4g} mm and {np.degrees(off[1]):.4g} deg from there; solve "

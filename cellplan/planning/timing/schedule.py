@@ -278,6 +278,13 @@ def _at_feed(task: Task, process: ProcessEntry, behind: Array) -> Array:
         key, most = "ramp_s", f"{lengths.min() / process.feed:.3g} s"
         if process.ramp_mm is not None:
             key, most = "ramp_mm", f"{MM * lengths.min() / 2.0:.4g} mm"
+        if any(process.runs):
+            key, other = ("run_in_mm", "run_out_mm") if process.runs[0] else ("run_out_mm", "run_in_mm")
+            raise InputError(
+                f"{task.where(f'process.{key}')}: expected less than half of the path and its run, "
+                f"{MM * lengths.min() / 2.0:.4g} mm, as the ramp at its other end is as long, got "
+                f"{MM * max(process.runs):g} mm; state {other} too, or make it shorter"
+            )
         raise InputError(
             f"{task.where(f'process.{key}')}: expected ramps that leave the feed of {MM * process.feed:g} mm/s some "
             f"of each side, got {process.ramp:g} s for one of {MM * lengths.min():.4g} mm; round the corners "

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.model.report.check_kinds import CHECK_KINDS
+from cellplan.model.report.greatest_feed import BETWEEN_ROWS
 from cellplan.model.report.left_out import NOTHING_LEFT_OUT, TITLES, LeftOutKind
 from cellplan.model.solver import METHODS
 from cellplan.report.record.common import Record
@@ -17,6 +18,7 @@ from cellplan.report.text.columns import Row, aligned
 from cellplan.report.text.method import DEFAULT_METHOD, moved_start_lines, no_accurate_mode
 from cellplan.report.text.notes import accuracy_note, clock_note, grip_notes, open_surface_notes, skew_row
 
+GAINED: Final = 0.95  # [-] of the roughness of a file: a smoothed path with more gains nothing
 NEAR_GREATEST: Final = 1.02  # [-] times a feed: a greatest one below is said
 MOST_OF_A_GROUP: Final = 8  # [-] failed checks that are shown; further ones are counted
 
@@ -122,7 +124,8 @@ def smoothing_rows(tasks: Record) -> Iterator[Row]:
             if (roughness := smoothing[what]) is not None and roughness["given"]:
                 smoothed, bound = (roughness[key] / roughness["given"] for key in ("smoothed", "bound"))
                 figure = f"{percent(smoothed, 1)} of the file's"
-                yield f"roughness of {what}", figure, f"at least {floored(100.0 * bound)} %, task {name}"
+                gain = "; the tube gains nothing" if smoothed > GAINED else ""
+                yield f"roughness of {what}", figure, f"at least {floored(100.0 * bound)} %, task {name}{gain}"
         position, orientation = smoothing["max_position_error_mm"], smoothing["max_orientation_error_deg"]
         figure = f"{_short(position)} mm, {_short(orientation)} deg"
         yield "error against the file", figure, f"{small(smoothing['max_depth_mm'])} mm into the part, task {name}"
@@ -133,9 +136,11 @@ def feed_rows(feeds: Record) -> Iterator[Row]:
     for name, feed in feeds.items():
         if feed and feed["greatest_mm_s"] is not None and feed["greatest_mm_s"] < NEAR_GREATEST * feed["feed_mm_s"]:
             ramp, point = " in a ramp" if feed["in_ramp"] else "", f" ({feed['point']})" if feed["point"] else ""
-            where = f"{feed['binding']}, {feed['limit']}{ramp}, at {small(feed['at_mm'])} mm{point}"
+            binds = [word for word in (feed["binding"], feed["limit"]) if word != name]
+            where = f"{', '.join(binds)}{ramp}, at {small(feed['at_mm'])} mm{point} {instant_text(feed)}"
+            cure = "; a smaller motion.step_s allows more" if feed["limit"] == BETWEEN_ROWS else ""
             figure = f"{fixed(feed['greatest_mm_s'])} mm/s"
-            yield "greatest feed", figure, f"task {name} at {fixed(feed['feed_mm_s'])}: {where} {instant_text(feed)}"
+            yield "greatest feed", figure, f"task {name} at {fixed(feed['feed_mm_s'])}: {where}{cure}"
 
 
 def _closure_rows(closures: Record) -> Iterator[Row]:

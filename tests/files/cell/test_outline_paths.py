@@ -183,6 +183,7 @@ REFUSED = {
     "outline: logo.dxf, layer: LONG, project: +z": f"{SURFACES} on the part, but it leaves it at x 1",
     "outline: {file: logo.dxf, at: {x_mm: 40}}, layer: CUT, project: +z": f"{SURFACES} within a smooth face, but at x ",
     "outline: {file: logo.dxf, contours: [4]}, layer: CUT, on: F2": "outline: expected contours up to 3, as many as",
+    "outline: {file: logo.dxf, contours: [2, 1, 2]}, layer: CUT, on: F2": "outline: expected every contour once, got 2",
     f"{OUTLINE}": f".path.on: missing, expected {FACES} of the part, or project: +z (or another side)",
     f"{OUTLINE}, on: F2, project: +z": ".path.on: expected either on or project, got both",
     "outline: logo.dxf, on: F2": ".path.layer: missing, expected the layer of the drawing",
@@ -200,6 +201,17 @@ def test_what_is_wrong_with_an_outline_is_said_at_its_key(folder: Path, path: st
 
     assert message.startswith(f"{PLACE}.path.")
     assert REFUSED[path] in message
+
+
+def test_an_outline_has_no_run_in_as_the_tool_begins_at_rest(folder: Path) -> None:
+    text = CELL.replace("PART", STEP).replace("feed_mm_s: 20", "feed_mm_s: 20, run_in_mm: 5")
+    (folder / "runs.yaml").write_text(
+        text.replace("PATH", "outline: {file: logo.dxf, contours: [1]}, layer: CUT, on: F2")
+    )
+    cell = load_cell(folder / "runs.yaml")
+
+    with pytest.raises(InputError, match=r"tasks\.cut\.process\.run_in_mm: expected none along a path with rapids"):
+        build_toolpath(cell.task("cut"), cell.part)
 
 
 def test_a_face_of_a_part_that_comes_from_no_step_file_is_refused(folder: Path) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from builders.study_trials import InThisProcess
+from builders.three_feeds import THREE_FEEDS
 from builders.two_phases import PAIR
 
 from cellplan import CompareJob, compare, load_cell, solve
@@ -283,3 +284,13 @@ def test_the_command_prints_verdicts_first_and_its_status_is_that_of_a_study(
 )
 def test_the_exit_status_is_that_of_the_best_variant(counts: tuple[int, ...], expected: int) -> None:
     assert exit_status(dict(zip(TrialStatus, counts, strict=True))) == expected
+
+
+@pytest.mark.slow
+def test_a_mode_whose_starts_suit_no_program_is_solved_without_its_moves(tmp_path: Path) -> None:
+    (tmp_path / "feeds.yaml").write_text(THREE_FEEDS)
+    job = CompareJob(subjects=(tmp_path / "feeds.yaml",))
+    outcome = evaluate_subject(job, Variant(0, {"motion.mode": "simultaneous", "program": {}}))
+
+    assert outcome.status is TrialStatus.FAILED
+    assert "with its approach of 30 mm" in outcome.figures["not_in_program"][0]

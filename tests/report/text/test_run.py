@@ -157,6 +157,35 @@ def test_what_is_not_known_is_left_out(record: dict[str, Any], tmp_path: Path) -
     assert not any("margin" in line or "speed" in line or "clearance" in line for line in lines)
 
 
+@pytest.mark.parametrize(
+    ("binding", "limit", "words_of_it"),
+    [
+        (
+            "ring",
+            "tolerance between rows",
+            "40.0: tolerance between rows, at 3 mm at 2.000 s; a smaller motion.step_s allows",
+        ),
+        ("pen B2", "jerk", "40.0: pen B2, jerk, at 3 mm at 2.000 s"),
+    ],
+)
+def test_what_binds_the_feed_is_said_once(
+    record: dict[str, Any], tmp_path: Path, binding: str, limit: str, words_of_it: str
+) -> None:
+    feed = {"feed_mm_s": 40.0, "greatest_mm_s": 40.1, "at_mm": 3.0, "at_s": 2.0, "in_ramp": False, "point": ""}
+    record["tasks"]["ring"]["greatest_feed"] = feed | {"binding": binding, "limit": limit}
+
+    assert any(f"task ring at {words_of_it}" in line for line in words(summary_lines(record, tmp_path)))
+
+
+def test_a_tube_in_which_a_path_is_no_smoother_is_said(record: dict[str, Any], tmp_path: Path) -> None:
+    errors = {"max_position_error_mm": 0.1, "max_orientation_error_deg": 0.1, "max_depth_mm": 0.0}
+    for smoothed, is_said in ((0.99, True), (0.1, False)):
+        points = {"given": 1.0, "smoothed": smoothed, "bound": 0.05}
+        record["tasks"]["ring"]["smoothing"] = errors | {"points": points, "axes": None}
+        (row,) = [line for line in words(summary_lines(record, tmp_path)) if line.startswith("roughness of points")]
+        assert ("the tube gains nothing" in row) == is_said
+
+
 def test_a_joint_that_does_not_come_back_is_named(record: dict[str, Any], tmp_path: Path) -> None:
     drifts = {
         "cycles": 25,
