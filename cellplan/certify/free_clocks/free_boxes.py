@@ -24,6 +24,7 @@ from cellplan.scene.collision.overlap.containment import is_inside
 from cellplan.scene.collision.separation import separation
 
 ROUNDING_TOL: Final = 1e-9  # [m] taken off every bound, so that rounding never lifts it above the truth
+SMALL: Final = 1e-4  # [m] reach of boxes in which surfaces are measured where hulls prove the middle but not the box
 SLOW_COUNT: Final = 3000  # distances of surfaces, of one search; hulls say less but true things after them
 
 
@@ -103,8 +104,12 @@ class BoxBounds:
         return np.einsum("mi,mi->m", n, p) + self._supports.reach(bodies, _turned(np.swapaxes(R, 1, 2), n))
 
     def read(self, boxes: Boxes, goals: Array) -> tuple[Boxes, list[Reading]]:
-        """Ask the engine in the middle of each box; exactly, where the hulls do not reach a goal in [m], shape (M,)."""
-        poses = self._placed(boxes)
+        """Ask the engine in the middle of each box; exactly, where the hulls do not reach a goal in [m], shape (M,).
+
+        In a small box they are to reach it everywhere: else cuts would follow the places where they just do.
+        """
+        poses, reach = self._placed(boxes), boxes.reach.sum(axis=1)
+        goals = goals + np.where(reach < SMALL, reach + 2.0 * ROUNDING_TOL, 0.0)
         readings = [
             self._reading(int(u), int(v), poses, sample=place, goal=float(goals[place]))
             for place, (u, v) in enumerate(self.ends[boxes.pair])
@@ -115,7 +120,7 @@ class BoxBounds:
         n = np.array(
             [np.zeros(3) if reading.direction is None else _unit(reading.direction) for reading in readings]
         ).reshape(-1, 3)
-        low = np.maximum(boxes.low, gap - boxes.reach.sum(axis=1) - ROUNDING_TOL)
+        low = np.maximum(boxes.low, gap - reach - ROUNDING_TOL)
         read = np.ones(len(boxes), dtype=bool)
         return Boxes(boxes.pair, boxes.rows, low, gap, boxes.reach, n, read), readings
 

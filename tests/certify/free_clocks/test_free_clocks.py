@@ -4,6 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from builders.grid_bodies import grid_body
 from builders.moving_cells import cell_with_bodies, program
 from builders.scene_builders import body, held_part, joint, make_cell, no_tool, placed, slide_model
 
@@ -62,6 +63,26 @@ def test_two_balls_are_nearest_where_they_pass_if_any_places_may_meet() -> None:
     assert bound.at is not None
     assert bound.at[0] == pytest.approx(bound.at[1] + 20.0, abs=1.0)  # 0.8 m are 20 steps
     assert bound.is_met
+
+
+@pytest.mark.parametrize("demand", [0.01, 0.03, 0.09])
+def test_a_ball_before_the_mouth_of_an_angle_may_come_nearer_to_its_hull_than_to_its_legs(demand: float) -> None:
+    """At the end of its way it is nearer to the hull than demanded by less than a box is cut to."""
+    angle = grid_body([[0.0, 0.1, 0.4], [0.0, 0.1, 0.4], [-0.1, 0.1]], {(0, 0, 0), (1, 0, 0), (0, 1, 0)})
+    radius, y = 0.05, 0.28
+    cell = make_cell(
+        placed("one", slide_model(angle)),
+        placed("two", slide_model(Sphere(radius)), base=pose((0.0, y, 0.0))),
+        checks=ChecksEntry(clearance_mm=1e3 * demand, contact_zone_mm=0.0),
+    )
+    end = 0.5 - y + np.sqrt(2.0) * (radius + demand - 2e-7)  # the hull ends in the plane x + y = 0.5
+    steps = np.linspace(0.0, 1.0, 8)
+    q = np.column_stack([-0.01 * steps[::-1], 0.8 + (end - 0.8) * steps])
+
+    bound = bound_of(Scene.from_cell(cell), q, np.array([[0.0, 7.0, 0.0, 7.0]]), with_minimum=False)
+
+    assert bound.is_met
+    assert demand <= bound.proved <= 0.131
 
 
 @pytest.mark.parametrize("late", [0.0, 0.2, 0.7])
