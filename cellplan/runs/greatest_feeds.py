@@ -61,7 +61,7 @@ class OpenFeed:
         return f"tasks.{self.task.name}.process.feed_mm_s"
 
     def refusal(self, feed: float, greatest: GreatestFeed | None) -> str:
-        """Why a feed in [m/s] cannot be held, as one located line; None for no feed that can be."""
+        """Why a feed in [m/s] cannot be held, as one located line; ``greatest`` is None where none can."""
         why = "" if greatest is None else f": {greatest.text}; the greatest is {MM * greatest.feed:.4g} mm/s"
         return f"{self.task.where(self.task.feed_key)}: feed {MM * feed:.4g} mm/s cannot be held{why}"
 
@@ -270,11 +270,7 @@ def _refuse_too_slow(opened: Sequence[OpenFeed], feeds: Mapping[str, float], ans
     for feed in opened:
         name = feed.task.name
         if name not in answers or feeds[name] < feed.lowest * (1.0 - ROUNDING):
-            least = feed.lowest or feeds[name]
-            why = f": {answers[name].text}; the greatest is {MM * feeds[name]:.4g} mm/s" if name in answers else ""
-            raise NoSolutionError(
-                f"{feed.task.where(feed.task.feed_key)}: feed {MM * least:g} mm/s cannot be held{why}"
-            )
+            raise NoSolutionError(feed.refusal(feed.lowest or feeds[name], answers.get(name)))
 
 
 def _rounded(feed: float) -> float:

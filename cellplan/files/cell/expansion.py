@@ -23,6 +23,7 @@ OF_PATH: Final = (
     "side_mm", "out_mm", "work_deg", "push_deg", "drag_deg", "from_mm", "to_mm", "reverse", "weave",
 )  # keys of a pass that are keys of its path  # fmt: skip
 OF_START: Final = ("start_deg", "start", "start_s")  # keys of a task that hold for the first of its parts
+WHOLE: Final = "unexpected key, an outline or a raster is run as it is drawn"
 NO_PARTS: Final = f"expected 1 to {MOST_PARTS} of them on the path; of a path from a file, write their count"
 EXCLUDES: Final = {"push_deg": "drag_deg", "drag_deg": "push_deg"}
 ROUNDING: Final = 1e-9  # [-] of a number of stitches
@@ -92,7 +93,10 @@ def expanded(document: YamlDocument, edge_length: EdgeLength) -> YamlDocument:
         except _NoPartsError as error:
             if entry.path.is_edge and length is None:
                 continue  # its edges or their file are wrong, and say so
-            findings.append(document.finding(("tasks", name, error.args[0]), NO_PARTS))
+            place: KeyPath = ("tasks", name, error.args[0])
+            is_whole = entry.path.is_on_part and not entry.path.is_edge
+            made_of = document.key_finding(place, WHOLE) if is_whole else document.finding(place, NO_PARTS)
+            findings.append(made_of)
             continue
         taken = next((it.name for it in made if it.name in tasks and it.name != name), None)
         if taken is not None:

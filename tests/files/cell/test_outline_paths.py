@@ -203,6 +203,16 @@ def test_what_is_wrong_with_an_outline_is_said_at_its_key(folder: Path, path: st
     assert REFUSED[path] in message
 
 
+def test_an_outline_is_no_path_of_tacks(folder: Path) -> None:
+    text = CELL.replace("PART", STEP).replace(
+        "{feed_mm_s: 20}", "{feed_mm_s: 20}\n    tacks: {length_mm: 5, pitch_mm: 9}"
+    )
+    (folder / "tacks.yaml").write_text(text.replace("PATH", "outline: logo.dxf, layer: CUT, on: F2"))
+
+    with pytest.raises(InputError, match=r"tasks\.cut\.tacks: unexpected key, an outline or a raster is run as it is"):
+        load_cell(folder / "tacks.yaml")
+
+
 def test_an_outline_has_no_run_in_as_the_tool_begins_at_rest(folder: Path) -> None:
     text = CELL.replace("PART", STEP).replace("feed_mm_s: 20", "feed_mm_s: 20, run_in_mm: 5")
     (folder / "runs.yaml").write_text(
