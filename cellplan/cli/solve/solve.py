@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 from cellplan.cli.options import shared
 from cellplan.cli.options.completion import one_of, run_folders
@@ -68,7 +68,10 @@ def solve(options: SolveOptions) -> Result:
     3 no solution, 4 internal error, 130 interrupted.
     """
     if options.watch:
-        _watch(options)
+        from cellplan.cli.watch.watch import watch
+
+        work = partial(_solved, options)
+        watch(work, options.cell, schema=options.schema, as_json=options.as_json, quiet=options.quiet)
     with progress_listener(quiet=options.quiet) as progress:
         return _solved(options, lambda _: None, progress)
 
@@ -142,14 +145,3 @@ def _written(solution: "Solution", folder: Path, options: SolveOptions, progress
 
         write_view_of_run(folder, solution.cell, progress=progress)
     return record
-
-
-def _watch(options: SolveOptions) -> NoReturn:
-    """Solve again and again, beside a page that shows the latest result."""
-    from cellplan.cli.watch.page import WatchPage
-    from cellplan.cli.watch.watch import watch
-
-    run = options.output or Path("outputs") / options.cell.stem
-    page = WatchPage(run, [("report", "report.html"), *([("3-D page", "view.html")] if options.with_view else [])])
-    work = partial(_solved, options)
-    watch(work, options.cell, schema=options.schema, as_json=options.as_json, quiet=options.quiet, page=page)

@@ -38,7 +38,6 @@ class Result(NamedTuple):
     status: ExitStatus  # exit status of the program
     lines: Sequence[str]  # for people: the verdict, and what stands below it
     record: Mapping[str, object]  # for machines
-    folder: Path | None = None  # the run folder that was written; None if there is none
     is_verdict: bool = True  # whether it passes or fails
 
 
@@ -48,7 +47,7 @@ def result_of_folder(
     """The result of a command that has written a folder with a page; ``says`` is its status in the record, if any."""
     about = {"schema": schema} | ({} if says is None else {"status": says}) | {"exit": int(status)}
     place = {"folder": str(page.parent), "report_path": str(page)}
-    return Result(status, lines, {**about, **place, **content}, page.parent)
+    return Result(status, lines, {**about, **place, **content})
 
 
 def notes(remarks: Sequence[str]) -> list[str]:

@@ -4,7 +4,6 @@ The system's own notifications do not reach into many containers and network fol
 for their times five times a second works everywhere and costs nothing that could be measured.
 """
 
-import contextlib
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -21,8 +20,6 @@ from cellplan.cli.terminal.errors import (
 )
 from cellplan.cli.terminal.output import Result, present, say_json
 from cellplan.cli.terminal.progress import Listener, progress_listener
-from cellplan.cli.watch.page import WatchPage
-from cellplan.errors import ExitStatus
 from cellplan.files.input.files import digest
 from cellplan.model.cell.cell import Cell
 
@@ -58,9 +55,7 @@ NOTHING: Final = digest(b"")  # of an empty file
 Stamp = tuple[int, int, int] | None  # time in [ns], size and number of a file; None while there is none
 
 
-def watch(
-    work: Work, cell: Path, *, schema: str, as_json: bool, quiet: bool, page: WatchPage | None = None
-) -> NoReturn:
+def watch(work: Work, cell: Path, *, schema: str, as_json: bool, quiet: bool) -> NoReturn:
     """Do the work, wait until a file is saved, and so on until Ctrl-C.
 
     What is wrong with a cell is said, and its files are watched further. Work during which a file is saved is given up
@@ -73,23 +68,18 @@ def watch(
         InterruptedWorkError: Always, at the end.
     """
     files, number = WatchedFiles(cell), 0
-    with contextlib.ExitStack() as opened:
-        if page is not None:
-            opened.callback(page.close)
-            page.open()
-            tell(f"open {page.path} in a browser: it shows each new result")
-        try:
-            while True:
-                number += 1
-                _round(work, files, page, schema=schema, as_json=as_json, quiet=quiet)
-                if not quiet:
-                    count = "1 file" if files.count == 1 else f"{files.count} files"
-                    tell(f"watching {count}: save one for another round, Ctrl-C ends")
-                saved = files.next_saved()
-                if not quiet:
-                    tell(f"round {number + 1}: {saved} was saved")
-        except KeyboardInterrupt:
-            raise InterruptedWorkError(f"watching ended in round {number}") from None
+    try:
+        while True:
+            number += 1
+            _round(work, files, schema=schema, as_json=as_json, quiet=quiet)
+            if not quiet:
+                count = "1 file" if files.count == 1 else f"{files.count} files"
+                tell(f"watching {count}: save one for another round, Ctrl-C ends")
+            saved = files.next_saved()
+            if not quiet:
+                tell(f"round {number + 1}: {saved} was saved")
+    except KeyboardInterrupt:
+        raise InterruptedWorkError(f"watching ended in round {number}") from None
 
 
 class WatchedFiles:
@@ -183,12 +173,10 @@ class WatchedFiles:
         self._digests[path] = _digest(path)
 
 
-def _round(work: Work, files: WatchedFiles, page: WatchPage | None, *, schema: str, as_json: bool, quiet: bool) -> None:
+def _round(work: Work, files: WatchedFiles, *, schema: str, as_json: bool, quiet: bool) -> None:
     """One round; saved files begin it anew."""
     while True:
         files.begin()
-        if page is not None:
-            page.show("working")
         try:
             with progress_listener(quiet=quiet) as listener:
                 result = work(files.follow, _interruptible(files, listener))
@@ -201,12 +189,9 @@ def _round(work: Work, files: WatchedFiles, page: WatchPage | None, *, schema: s
             if files.rewritten() is not None:  # half a save was read
                 files.settle()
                 continue
-            _refuse(error, files, page, schema=schema, as_json=as_json)
+            _refuse(error, files, schema=schema, as_json=as_json)
             return
         present(result, as_json=as_json, on_one_line=True)
-        if page is not None:
-            failed = result.status != ExitStatus.PASSED
-            page.show("failed" if failed else "passed", run=result.folder)
         return
 
 
@@ -220,16 +205,13 @@ def _interruptible(files: WatchedFiles, listener: Listener) -> Listener:
     return listen
 
 
-def _refuse(error: Exception, files: WatchedFiles, page: WatchPage | None, *, schema: str, as_json: bool) -> None:
+def _refuse(error: Exception, files: WatchedFiles, *, schema: str, as_json: bool) -> None:
     """Say why a round has no result, and watch for files that the cell lacks."""
     files.follow_neighbours()
-    lines = error_lines(error)
     if as_json:
         status = int(exit_status(error))
-        say_json({"schema": schema, "status": "error", "exit": status, "errors": lines}, on_one_line=True)
+        say_json({"schema": schema, "status": "error", "exit": status, "errors": error_lines(error)}, on_one_line=True)
     report_failure(error)
-    if page is not None:
-        page.show("error", lines)
 
 
 class InputsChangedError(Exception):

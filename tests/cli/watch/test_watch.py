@@ -16,9 +16,8 @@ import pytest
 from builders.stored_cells import write_cell
 
 from cellplan.cli.terminal.output import Result
-from cellplan.cli.watch.page import WatchPage
 from cellplan.cli.watch.watch import InputsChangedError, WatchedFiles, watch
-from cellplan.errors import ExitStatus, InputError
+from cellplan.errors import InputError
 from cellplan.files.cell.load import load_cell
 
 PROGRESS = re.compile(r"[\w -]+: \d+ %")
@@ -265,47 +264,3 @@ def test_work_on_a_cell_that_is_saved_meanwhile_begins_anew(pair: Path, monkeypa
         watch(work, pair, schema="x/1", as_json=False, quiet=True)
 
     assert texts == ["\n", "#"]
-
-
-def test_the_page_lies_beside_the_run_and_goes_with_the_watching(tmp_path: Path) -> None:
-    page = WatchPage(tmp_path / "run", [("report", "report.html")])
-    page.open()
-    page.show("passed", run=tmp_path / "a run")
-    script = (tmp_path / "run-watch.js").read_text(encoding="utf-8")
-    page.close()
-
-    state = {"number": 1, "run": "a%20run", "phase": "passed", "lines": []}
-    assert json.loads(script.removeprefix("cellplanState(").removesuffix(");\n")) == state
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_page_of_the_user_is_not_replaced(tmp_path: Path) -> None:
-    (tmp_path / "run-watch.html").write_text("mine", encoding="utf-8")
-
-    with pytest.raises(InputError, match="holds something that watching did not write"):
-        WatchPage(tmp_path / "run", [("report", "report.html")]).open()
-
-    assert (tmp_path / "run-watch.html").read_text(encoding="utf-8") == "mine"
-
-
-def test_status_of_the_page_follows_the_result(pair: Path) -> None:
-    shown: list[str] = []
-    outcomes = iter([ExitStatus.PASSED, ExitStatus.CHECK_FAILED])
-
-    class Page(WatchPage):
-        def show(self, phase: str, lines: Any = (), *, run: Path | None = None) -> None:
-            shown.append(phase)
-            super().show(phase, lines, run=run)
-
-    def work(follow: Any, _: Any) -> Result:
-        follow(load_cell(pair))
-        status = next(outcomes, None)
-        if status is None:
-            raise KeyboardInterrupt
-        pair.write_text(pair.read_text(encoding="utf-8") + "#", encoding="utf-8")  # for the next round
-        return Result(status, ["result"], {}, pair.parent)
-
-    with pytest.raises(Exception, match="watching ended"):
-        watch(work, pair, schema="x/1", as_json=False, quiet=True, page=Page(pair.parent / "run", []))
-
-    assert shown == ["working", "working", "passed", "working", "failed", "working"]

@@ -134,7 +134,5 @@
   addEventListener("hashchange", unfold);
   unfold();
 
-  // The page of a watched cell asks for the latest report, which keeps its place.
-  addEventListener("message", (event) => event.data === "cellplan:reload" && location.reload());
   document.body.dataset.ready = "true";
 })();

@@ -58,19 +58,6 @@ class Camera {
     this.whole = whole;
   }
 
-  /** Where the camera is, as a text: two angles in rad, the distance and the target in m. */
-  get place() {
-    return [this.azimuth, this.elevation, this.distance, ...this.target].map((each) => each.toFixed(6)).join(",");
-  }
-
-  goTo(place) {
-    const values = place.split(",").map(parseFloat);
-    if (values.length !== 6 || !values.every(Number.isFinite)) return;
-    [this.azimuth, this.elevation, this.distance] = values;
-    this.target = values.slice(3);
-    this.onChange();
-  }
-
   get eye() {
     const flat = Math.cos(this.elevation) * this.distance;
     const away = [Math.cos(this.azimuth) * flat, Math.sin(this.azimuth) * flat, Math.sin(this.elevation) * this.distance];

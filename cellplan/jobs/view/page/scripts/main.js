@@ -26,7 +26,6 @@ class App {
     });
     addEventListener("resize", () => this.refresh());
     addEventListener("hashchange", () => this.follow());
-    addEventListener("message", (event) => event.data === "cellplan:reload" && this.reload());
     this.setScene(0);
     if (record.kind !== "study" && !("t" in readAddress()) && this.stage.scene.failures.length) this.showFailure(0);
     this.follow();
@@ -122,23 +121,12 @@ class App {
     this.player.goTo(t);
   }
 
-  /** Load the page of a watched cell again, with the same instant and the same camera. */
-  reload() {
-    writeAddress({ ...readAddress(), t: String(this.player.t), camera: this.camera.place });
-    location.reload();
-  }
-
   /** Go where the address of the page says. */
   follow() {
     const address = readAddress();
     const layout = Number(address.layout) - 1;
     if (Number.isInteger(layout) && this.record.scenes[layout] && layout !== this.place) this.setScene(layout);
     if (address.view in PRESETS) this.camera.look(address.view);
-    if (address.camera) {
-      this.camera.goTo(address.camera);
-      delete address.camera; // it holds until it is moved
-      writeAddress(address);
-    }
     if (Number.isFinite(parseFloat(address.t))) this.jump(parseFloat(address.t));
     else this.refresh();
   }
