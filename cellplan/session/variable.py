@@ -1,4 +1,4 @@
-"""One number of a cell that may be changed while it is looked at."""
+"""One number of a cell that may be changed while its motion is shown."""
 
 import math
 from dataclasses import dataclass
