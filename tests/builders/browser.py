@@ -87,7 +87,12 @@ class Browser:
             self._note(answer)
 
     def open(self, page: Path, address: str = "", *, size: tuple[int, int] = (1280, 800), theme: str = "light") -> None:
-        """Load a page and wait until it is drawn."""
+        """Load a page in a file and wait until it is drawn."""
+        self.visit(f"file://{page}{address}", size=size, theme=theme)
+        self.run(f"await {READY} look(); }}); await drawn();")
+
+    def visit(self, address: str, *, size: tuple[int, int] = (1280, 800), theme: str = "light") -> None:
+        """Load what stands at an address."""
         self.console.clear()
         feature = {"name": "prefers-color-scheme", "value": theme}
         self.command("Emulation.setEmulatedMedia", features=[feature])
@@ -96,8 +101,19 @@ class Browser:
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
         )
         self.command("Page.navigate", url="about:blank")
-        self.command("Page.navigate", url=f"file://{page}{address}")
-        self.run(f"await {READY} look(); }}); await drawn();")
+        self.command("Page.navigate", url=address)
+
+    def pointer(self, kind: str, x: float, y: float) -> None:
+        """A true event of the mouse with its left button: ``Pressed``, ``Moved`` or ``Released``."""
+        is_held = kind != "Released"
+        self.command(
+            "Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button="left", buttons=int(is_held), clickCount=1
+        )
+
+    def key(self, key: str, *, modifiers: int = 0) -> None:
+        """Press and release a key; modifiers are 1 alt, 2 ctrl, 4 meta and 8 shift, added."""
+        for kind in ("rawKeyDown", "keyUp"):
+            self.command("Input.dispatchKeyEvent", type=kind, key=key, modifiers=modifiers)
 
     def run(self, script: str) -> Any:
         """What the body of an async function in the page returns; errors in it fail the test."""

@@ -42,7 +42,7 @@ POSE_DECIMALS: Final = 9  # [m]: far below what a picture shows
 POINT_DECIMALS: Final = 6  # [m] of paths and nearest points
 
 _SCRIPTS: Final = (
-    "algebra kinematics shapes camera webgl painter sight stage traces dom player controls panels bases main"
+    "algebra kinematics shapes camera webgl painter sight stage traces dom player controls panels bases main start"
 )
 SCRIPTS: Final = _SCRIPTS.split()  # each after those that it needs
 

@@ -3,7 +3,8 @@
 const MOVING_SHARPNESS = 0.6; // pixels of the picture by those of the window
 
 class App {
-  constructor(record) {
+  /** Parts are the classes of controls, lists and fields. */
+  constructor(record, parts) {
     this.record = record;
     this.failure = -1;
     this.markedAt = null; // time at which the bodies of a failure are marked
@@ -12,9 +13,9 @@ class App {
     this.player = new Player(() => this.refresh());
     this.player.setMotion(this.stage.motion);
     this.open();
-    this.controls = new Controls(this);
-    this.panels = new Panels(this);
-    this.bases = new Bases(this);
+    this.controls = new parts.Controls(this);
+    this.panels = new parts.Panels(this);
+    this.bases = new parts.Bases(this);
     this.fillLayouts();
     byId("traces").addEventListener("change", (event) => {
       this.stage.traceIn = event.target.value;
@@ -144,12 +145,20 @@ class App {
     this.refresh();
   }
 
+  get moves() {
+    return this.player.isPlaying || this.camera.pointers.size > 0;
+  }
+
+  /** What a page adds to the picture of an instant. */
+  decorated(frame) {
+    return frame;
+  }
+
   /** As many pixels as the window has; fewer while the picture moves and the processor draws it. */
   fitCanvas() {
     const canvas = byId("canvas");
     const isSlow = this.isStill || this.view.isSoftware;
-    const moves = this.player.isPlaying || this.camera.pointers.size > 0;
-    const sharpness = isSlow ? (moves ? MOVING_SHARPNESS : 1) : Math.min(devicePixelRatio || 1, 2);
+    const sharpness = isSlow ? (this.moves ? MOVING_SHARPNESS : 1) : Math.min(devicePixelRatio || 1, 2);
     const size = [canvas.clientWidth, canvas.clientHeight].map((each) => Math.max(1, Math.round(each * sharpness)));
     if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
   }
@@ -169,7 +178,7 @@ class App {
     const state = this.stage.at(this.player.t);
     if (this.stage.moved) Object.assign(state, { nearest: null, red: new Set() });
     this.fitCanvas();
-    this.view.draw(this.stage.frame(state, this.camera.eye), this.camera, background());
+    this.view.draw(this.decorated(this.stage.frame(state, this.camera.eye), state), this.camera, background());
     this.controls.update();
     this.panels.update(state);
     this.placeLabels(state);
@@ -228,6 +237,6 @@ function background() {
   return text.match(/[\d.]+/g).slice(0, 3).map((value) => Number(value) / 255);
 }
 
-const prefersDark = matchMedia("(prefers-color-scheme: dark)");
-document.documentElement.dataset.theme = prefersDark.matches ? "dark" : "light";
-const app = new App(JSON.parse(byId("data").textContent));
+function followSystemTheme() {
+  document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
+}

@@ -8,6 +8,7 @@ class Player {
     this.t = 0;
     this.speed = 1;
     this.isPlaying = false;
+    this.isLooping = false; // whether the begin follows the end
     this.last = null;
   }
 
@@ -45,6 +46,7 @@ class Player {
     if (!this.isPlaying) return;
     if (this.last !== null) this.t += (this.speed * (now - this.last)) / 1000;
     this.last = now;
+    if (this.isLooping) this.t %= this.motion.end;
     if (this.t >= this.motion.end) {
       this.t = this.motion.end;
       this.pause();

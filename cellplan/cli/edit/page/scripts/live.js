@@ -1,0 +1,211 @@
+// The live cell: the page of a session, its answers in the picture and beside it.
+
+const KEY_ACTIONS = { c: "certify", i: "improve", r: "repair", m: "map" };
+const CONTROL_ACTIONS = { z: "undo", y: "redo", s: "save" };
+const BUTTONS = ["certify", "improve", "repair", "map", "stop", "undo", "redo", "reset", "save", "end"];
+
+class LiveApp extends App {
+  constructor(record, client) {
+    super(viewOf(record), { Controls: LiveControls, Panels: LivePanels, Bases: Fields });
+    this.client = client;
+    this.player.isLooping = true;
+    this.handles = new Handles(this);
+    this.overlay = new Overlay(this);
+    this.figures = new Figures(this);
+    this.outcome = new Outcome(this);
+    for (const action of BUTTONS) byId(action).addEventListener("click", () => this.act(action));
+    byId("file-take").addEventListener("click", () => this.act("take"));
+    byId("file-keep").addEventListener("click", () => this.act("keep"));
+    byId("copy").addEventListener("click", () => navigator.clipboard?.writeText(byId("history").value));
+    for (const name of Object.keys(this.overlay.shown)) {
+      byId("show-live").append(checkbox(name, true, (isOn) => {
+        this.overlay.shown[name] = isOn;
+        this.refresh();
+      }));
+    }
+    this.setRecord(record);
+  }
+
+  /** Show another cell, or the same one read again. */
+  setRecord(record) {
+    this.variables = new Map(record.variables.map((variable) => [variable.address, variable]));
+    byId("name").textContent = record.cell;
+    byId("file-name").textContent = record.file;
+    document.title = `${record.cell}: live cell`;
+    this.version = -1;
+    this.stage.moved = true; // distances of the start are not those of an answer
+    this.wanted = record.answer.values;
+    this.bases.setScene();
+    this.handles.setScene();
+    this.overlay.setScene();
+    this.apply(record.answer);
+  }
+
+  /** Ask for the cell again, after its file was changed. */
+  async reopen() {
+    await this.client.guarded(async () => {
+      const record = await this.client.record("/open", {});
+      const { camera } = this;
+      const before = camera.place;
+      this.record = viewOf(record);
+      this.stage = new Stage(this.record);
+      this.open();
+      this.setScene(0);
+      this.setRecord(record);
+      camera.goTo(before);
+    });
+  }
+
+  /** Take an answer that is not older than the last one. */
+  apply(answer) {
+    if (answer.version < this.version) return;
+    this.version = answer.version;
+    this.answer = answer;
+    const isBusy = this.client.isSending && this.client.waiting;
+    this.wanted = isBusy || this.handles.held ? { ...answer.values, ...this.wanted } : { ...answer.values };
+    this.pose(answer);
+    if (answer.state === "certified") this.overlay.keepGhost(answer);
+    this.bases.update(this.wanted);
+    this.figures.show(answer);
+    this.controls.setScene();
+    this.refresh();
+  }
+
+  /** Bring robots, tools, part and obstacles where an answer has them. */
+  pose({ motion, poses, is_settled: isSettled }) {
+    const { stage } = this;
+    const { scene } = stage;
+    poses.bases.forEach((pose, robot) => { stage.bases[robot] = fromRows(pose); });
+    poses.tools.forEach((pose, robot) => { scene.robots[robot].tip = pose; });
+    for (const [index, pose] of Object.entries(poses.bodies)) this.placeBody(Number(index), pose);
+    if (motion) {
+      stage.motion = new Motion(motion);
+      this.player.setMotion(stage.motion);
+    }
+    stage.fitWedges(this.view);
+    stage.traces = new Traces(stage);
+    if (isSettled) stage.sight = new Sight(stage);
+  }
+
+  /** The pose of a body on its link; the part brings its paths with it. */
+  placeBody(index, pose) {
+    const { stage } = this;
+    const before = stage.poses[index];
+    stage.poses[index] = fromRows(pose);
+    if (stage.scene.bodies[index].kind !== "part") return;
+    const place = stage.scene.part[0];
+    const moved = multiply(stage.poses[index], multiply(inverseRigid(before), fromRows(place.pose)));
+    place.pose = [0, 1, 2].flatMap((row) => [0, 4, 8, 12].map((column) => moved[row + column]));
+  }
+
+  /** Change values by address, within their ranges; locked ones stay. */
+  change(values, block) {
+    const sent = {};
+    for (const [address, value] of Object.entries(values)) {
+      const variable = this.variables.get(address);
+      if (variable && !variable.is_locked) sent[address] = clamp(value, variable.lower, variable.upper);
+    }
+    if (block === undefined && Object.keys(sent).length === 0) return;
+    this.wanted = { ...this.wanted, ...sent };
+    this.client.change(sent, block);
+    this.bases.update(this.wanted);
+    this.refresh();
+  }
+
+  /** Move a base by what an arrow says. */
+  followAdvice(advice) {
+    const handle = this.handles.all.find(({ prefix, index }) => prefix === "base" && index === advice.robot);
+    if (!handle) return;
+    const values = {};
+    ["x", "y", "z"].forEach((axis, i) => {
+      const variable = handle[axis];
+      if (variable) values[variable.address] = this.handles.snapped(variable, this.wanted[variable.address] + advice.step_mm * unit(advice.direction)[i]);
+    });
+    this.change(values);
+  }
+
+  act(action) {
+    const working = Object.values(KEY_ACTIONS).includes(action);
+    if (working) {
+      this.outcome.clear();
+      this.outcome.progress({ work: action, fraction: 0, text: "begins" });
+    }
+    if (action === "stop") this.outcome.done();
+    if (action === "take" || action === "keep") byId("file").hidden = true;
+    const selected = this.handles.selected;
+    const argument = action === "map" ? (selected?.prefix === "base" ? selected.index : 0) : undefined;
+    return this.client.act(action, argument);
+  }
+
+  /** The session has ended: say so, and leave what was changed to be copied. */
+  leave(text) {
+    this.client.isGone = true;
+    byId("gone-text").textContent = text;
+    byId("gone").hidden = false;
+    byId("history-panel").open = true;
+    for (const control of document.querySelectorAll("#tools button, #fields input, #advice button, #strip button")) control.disabled = true;
+  }
+
+  refused(text) {
+    this.outcome.done();
+    this.outcome.say(text, "mark");
+    if (this.answer) this.wanted = { ...this.answer.values };
+    this.bases.update(this.wanted, true);
+    this.refresh();
+  }
+
+  get moves() {
+    return super.moves || Boolean(this.handles?.held);
+  }
+
+  decorated(frame, state) {
+    if (!this.answer) return frame;
+    return { bodies: [...this.overlay.bodies(state), ...frame.bodies].sort((a, b) => (b.opacity ?? 1) - (a.opacity ?? 1)), lines: [...frame.lines, ...this.overlay.lines(state)] };
+  }
+
+  verdict() {
+    return this.answer?.verdict ?? "";
+  }
+
+  keepAddress() {} // the address of a session leads to no instant
+}
+
+/** The record of the picture; what was found at the start is not what an answer says. */
+function viewOf(record) {
+  const scenes = record.view.scenes.map((scene) => ({ ...scene, facts: [], failures: [], contacts: [], passed: null }));
+  return { ...record.view, scenes };
+}
+
+class LiveControls extends Controls {
+  curve() {
+    const { answer, stage } = this.app;
+    if (!answer) return [];
+    this.cursor = svgElement("line", { x1: 0, x2: 0, y1: 0, y2: CURVE_HEIGHT, class: "cursor" });
+    return [...shareCurve(answer, stage.motion.end), this.cursor];
+  }
+
+  press(event) {
+    const action = (event.ctrlKey || event.metaKey) && !event.altKey && CONTROL_ACTIONS[event.key.toLowerCase()];
+    if (!action || event.target.tagName === "TEXTAREA") {
+      super.press(event);
+      return;
+    }
+    event.preventDefault();
+    this.app.act(action === "undo" && event.shiftKey ? "redo" : action);
+  }
+
+  act(key, isShifted) {
+    const { handles } = this.app;
+    if (KEY_ACTIONS[key]) this.app.act(KEY_ACTIONS[key]);
+    else if (key === "b" || key === "B") handles.next(isShifted ? -1 : 1);
+    else if (key === "Escape" && handles.selected) handles.select(null);
+    else if (!handles.selected || !handles.nudge(key, isShifted)) return super.act(key, isShifted);
+    return true;
+  }
+}
+
+class LivePanels extends Panels {
+  nearestText() {
+    return [];
+  }
+}

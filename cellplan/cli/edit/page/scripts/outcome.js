@@ -1,0 +1,86 @@
+// What comes of heavy work and of the cell file: progress, verdicts, trials, remedies, and the question of a conflict.
+
+const FILE_TEXTS = {
+  changed: "the cell file was changed and is read again",
+  broken: "the cell file cannot be read; the last state that could be stays",
+  conflict: "the cell file was changed, and so was the cell here: which is to stay?",
+  gone: "the cell file is gone; saving writes it again",
+  saved: "saved",
+};
+
+class Outcome {
+  constructor(app) {
+    this.app = app;
+  }
+
+  take(event) {
+    const receivers = {
+      answer: () => this.app.apply(event.answer),
+      progress: () => this.progress(event),
+      verdict: () => this.verdict(event),
+      trial: () => this.offer(event.text, event.values),
+      remedies: () => this.remedies(event.remedies),
+      tiles: () => this.app.overlay.putTiles(event),
+      file: () => this.file(event),
+      failed: () => this.say(`${event.work} failed: ${event.text}`, "mark"),
+      end: () => this.app.leave(event.text || "the session has ended"),
+    };
+    receivers[event.event]?.();
+    this.app.refresh();
+  }
+
+  progress({ work, fraction, text }) {
+    const isDone = fraction >= 1;
+    byId("progress").hidden = isDone;
+    byId("stop").disabled = isDone;
+    byId("progress-bar").value = fraction;
+    byId("progress-text").textContent = `${work}: ${text}`;
+    if (isDone && text) this.say(`${work}: ${text}`);
+  }
+
+  /** Work has ended. */
+  done() {
+    byId("progress").hidden = true;
+    byId("stop").disabled = true;
+  }
+
+  verdict({ passed, lines }) {
+    this.done();
+    this.clear();
+    this.say(passed ? "certified: all checks of solve passed" : "not certified: checks of solve failed", passed ? "good" : "mark");
+    lines.forEach((line) => this.say(line));
+  }
+
+  remedies(remedies) {
+    this.done();
+    this.clear();
+    if (!remedies.length) this.say("no remedy was found");
+    for (const { title, text, values } of remedies) this.offer(`${title}: ${text}`, values);
+  }
+
+  /** A button that takes values. */
+  offer(text, values) {
+    const button = element("button", { type: "button", className: "jump", textContent: text });
+    button.addEventListener("click", () => this.app.change(values));
+    byId("outcome").append(element("li", {}, button));
+    byId("outcome-panel").hidden = false;
+  }
+
+  say(text, className = "") {
+    byId("outcome").append(element("li", { textContent: text, className }));
+    byId("outcome-panel").hidden = false;
+  }
+
+  clear() {
+    byId("outcome").replaceChildren();
+  }
+
+  file({ state, text }) {
+    byId("file-text").textContent = text || FILE_TEXTS[state];
+    byId("file").hidden = state === "saved";
+    byId("file").className = state;
+    byId("file-choice").hidden = state !== "conflict";
+    if (state === "conflict") byId("file-take").focus();
+    if (state === "changed") this.app.reopen();
+  }
+}
