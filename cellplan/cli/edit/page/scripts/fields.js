@@ -24,7 +24,8 @@ class Fields {
   }
 
   field(variable) {
-    const { address, label, unit } = variable;
+    const { address, unit } = variable;
+    const label = variable.label.replace(`${variable.subject} `, "");
     const input = element("input", { type: "number", step: "any", disabled: variable.is_locked, value: shortest(variable.value) });
     input.dataset.address = address;
     input.addEventListener("input", () => {

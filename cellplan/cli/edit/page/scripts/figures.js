@@ -12,7 +12,7 @@ class Figures {
   show(answer) {
     byId("state").textContent = `${MARKS[answer.state]} ${answer.state}`;
     byId("state").className = STATE_CLASS[answer.state];
-    byId("verdict").textContent = answer.verdict;
+    byId("verdict").textContent = answer.verdict.replace(`${answer.state}: `, "");
     byId("lost").textContent = answer.lost_at === null ? "" : `gets to ${seconds(answer.lost_at)}`;
     byId("settling").textContent = answer.is_settled ? "" : "…";
     if (answer.is_settled) byId("spoken").textContent = `${answer.state}: ${answer.verdict}`;
@@ -32,11 +32,11 @@ class Figures {
     const { name, value, unit, limit, is_met: isMet, binds, at } = figure;
     const text = (number) => (number === null ? "–" : `${printed(number, unit === "s" ? 3 : unit === "%" ? 0 : 2)} ${unit}`);
     const where = [binds, at === null ? "" : `at ${seconds(at)}`].filter(Boolean).join(" ");
-    const button = element("button", { type: "button", className: "jump", textContent: where || "–", disabled: at === null && !binds });
+    const button = element("button", { type: "button", className: "jump", textContent: where });
     button.addEventListener("click", () => this.mark(binds ?? "", at));
     return element("tr", { className: isMet ? "" : "mark" },
-      element("th", { textContent: name, attributes: { scope: "row" } }), element("td", { textContent: text(value) }),
-      element("td", { className: "soft", textContent: limit === null ? "" : text(limit) }), element("td", {}, button));
+      element("th", { attributes: { scope: "row" } }, name, ...(where ? [button] : [])), element("td", { textContent: text(value) }),
+      element("td", { className: "soft", textContent: limit === null ? "" : text(limit) }));
   }
 
   mark(binds, at) {

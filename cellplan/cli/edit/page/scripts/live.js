@@ -2,6 +2,7 @@
 
 const KEY_ACTIONS = { c: "certify", i: "improve", r: "repair", m: "map" };
 const CONTROL_ACTIONS = { z: "undo", y: "redo", s: "save" };
+const SLOW_PICTURE_MS = 90; // between pictures that the processor draws during a drag
 const BUTTONS = ["certify", "improve", "repair", "map", "stop", "undo", "redo", "reset", "save", "end"];
 
 class LiveApp extends App {
@@ -29,6 +30,7 @@ class LiveApp extends App {
   /** Show another cell, or the same one read again. */
   setRecord(record) {
     this.variables = new Map(record.variables.map((variable) => [variable.address, variable]));
+    this.rods = new Map(record.variables.filter(({ kind }) => kind === "tool_length").map((rod) => [rod.subject, rod]));
     byId("name").textContent = record.cell;
     byId("file-name").textContent = record.file;
     document.title = `${record.cell}: live cell`;
@@ -77,7 +79,10 @@ class LiveApp extends App {
     const { scene } = stage;
     poses.bases.forEach((pose, robot) => { stage.bases[robot] = fromRows(pose); });
     poses.tools.forEach((pose, robot) => { scene.robots[robot].tip = pose; });
-    for (const [index, pose] of Object.entries(poses.bodies)) this.placeBody(Number(index), pose);
+    scene.bodies.forEach((body, index) => {
+      stage.poses[index] = multiply(fromRows(poses.bodies[index] ?? body.pose), scaling([1, 1, this.stretch(body)]));
+    });
+    scene.part[0].pose = poses.part ?? scene.part[0].pose;
     if (motion) {
       stage.motion = new Motion(motion);
       this.player.setMotion(stage.motion);
@@ -87,15 +92,13 @@ class LiveApp extends App {
     if (isSettled) stage.sight = new Sight(stage);
   }
 
-  /** The pose of a body on its link; the part brings its paths with it. */
-  placeBody(index, pose) {
-    const { stage } = this;
-    const before = stage.poses[index];
-    stage.poses[index] = fromRows(pose);
-    if (stage.scene.bodies[index].kind !== "part") return;
-    const place = stage.scene.part[0];
-    const moved = multiply(stage.poses[index], multiply(inverseRigid(before), fromRows(place.pose)));
-    place.pose = [0, 1, 2].flatMap((row) => [0, 4, 8, 12].map((column) => moved[row + column]));
+  /** By how much the rod of a tool is longer than in the file, as a factor. */
+  stretch(body) {
+    const { capsule } = this.record.geometries[body.geometry] ?? {};
+    const rod = body.kind === "tool" && capsule && this.rods.get(this.stage.scene.robots[body.robot].name);
+    if (!rod) return 1;
+    const [radius, line] = capsule;
+    return 1 + (this.answer.values[rod.address] - rod.given) / 1000 / (line + 2 * radius);
   }
 
   /** Change values by address, within their ranges; locked ones stay. */
@@ -156,6 +159,20 @@ class LiveApp extends App {
 
   get moves() {
     return super.moves || Boolean(this.handles?.held);
+  }
+
+  /** Draw soon; where the processor draws, not so often that answers to a drag wait for it. */
+  refresh() {
+    if (!this.handles?.held || !this.isSlow) {
+      super.refresh();
+      return;
+    }
+    if (this.isPostponed) return;
+    this.isPostponed = true;
+    setTimeout(() => {
+      this.isPostponed = false;
+      super.refresh();
+    }, SLOW_PICTURE_MS);
   }
 
   decorated(frame, state) {

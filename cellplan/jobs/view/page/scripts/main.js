@@ -145,6 +145,11 @@ class App {
     this.refresh();
   }
 
+  /** Whether the processor draws the picture. */
+  get isSlow() {
+    return this.isStill || this.view.isSoftware;
+  }
+
   get moves() {
     return this.player.isPlaying || this.camera.pointers.size > 0;
   }
@@ -157,8 +162,7 @@ class App {
   /** As many pixels as the window has; fewer while the picture moves and the processor draws it. */
   fitCanvas() {
     const canvas = byId("canvas");
-    const isSlow = this.isStill || this.view.isSoftware;
-    const sharpness = isSlow ? (this.moves ? MOVING_SHARPNESS : 1) : Math.min(devicePixelRatio || 1, 2);
+    const sharpness = this.isSlow ? (this.moves ? MOVING_SHARPNESS : 1) : Math.min(devicePixelRatio || 1, 2);
     const size = [canvas.clientWidth, canvas.clientHeight].map((each) => Math.max(1, Math.round(each * sharpness)));
     if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
   }
