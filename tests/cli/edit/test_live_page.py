@@ -224,7 +224,7 @@ def test_advice_is_an_arrow_and_a_button_that_moves_the_base(page: Browser, sess
 EVENTS: list[dict[str, Any]] = [
     {"event": "progress", "work": "improve", "fraction": 0.5, "text": "trial 3"},
     {"event": "trial", "work": "improve", "text": "margin 12 deg", "values": {"robots.left.base.x_mm": 44}},
-    {"event": "tiles", "robot": 0, "size_mm": 200, "tiles": [{"x_mm": 0, "y_mm": 0, "value": 1, "state": "fails"}]},
+    {"event": "tiles", "robot": "left", "size_mm": 200, "tiles": [{"x_mm": 0, "y_mm": 0, "value": 1, "state": "passes"}]},
     {"event": "file", "state": "conflict", "text": "the file was changed"},
 ]
 
@@ -241,7 +241,7 @@ def test_events_show_progress_trials_tiles_and_the_question_of_a_conflict(page: 
     """)
     page.run("await new Promise((go) => setTimeout(go, 100));" + IDLE)
 
-    assert seen == ["improve: trial 3", 1, "file-take"]
+    assert seen == ["improve: trial 3", 1, "file-reload"]
     assert changes(session) == [{"robots.left.base.x_mm": 44}]
     assert ("/do", {"action": "keep"}) in session.received
 

@@ -17,8 +17,7 @@ class Figures {
     byId("settling").textContent = answer.is_settled ? "" : "…";
     if (answer.is_settled) byId("spoken").textContent = `${answer.state}: ${answer.verdict}`;
     byId("figures").replaceChildren(...answer.figures.map((figure) => this.row(figure)));
-    byId("advice").replaceChildren(...answer.advice.map((advice) => this.advice(advice)));
-    byId("advice-panel").hidden = answer.advice.length === 0;
+    this.showAdvice(answer);
     this.showStrip(answer);
     const lines = answer.history.join("\n");
     if (byId("history").value !== lines) byId("history").value = lines;
@@ -45,6 +44,15 @@ class Figures {
     stage.picked = new Set([...stage.scene.bodies.keys()].filter((index) => names.has(stage.scene.bodies[index].name)));
     if (at !== null) this.app.jump(at);
     this.app.refresh();
+  }
+
+  /** What would help; while things move, what was advised last stays in its place, but cannot be followed. */
+  showAdvice(answer) {
+    const isOld = !answer.is_settled && answer.advice.length === 0;
+    byId("advice").classList.toggle("old", isOld);
+    if (!isOld) byId("advice").replaceChildren(...answer.advice.map((advice) => this.advice(advice)));
+    for (const button of byId("advice").querySelectorAll("button")) button.disabled = isOld;
+    byId("advice-panel").hidden = byId("advice").children.length === 0;
   }
 
   advice(advice) {

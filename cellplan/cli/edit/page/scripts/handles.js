@@ -67,6 +67,11 @@ class Handles {
     return { at, heading, size, knobs };
   }
 
+  /** Knobs of obstacles come when they are selected, as cells have many of them. */
+  hasKnobs(handle) {
+    return handle.prefix === "base" || handle === this.selected;
+  }
+
   /** Where the pointer's line of sight begins and goes. */
   ray(event) {
     const { camera } = this.app;
@@ -85,7 +90,7 @@ class Handles {
     let nearest = null;
     for (const handle of this.all) {
       const { at, size, knobs } = this.knobs(handle);
-      const options = Object.entries(knobs).map(([part, knob]) => [part, offRay(ray, knob) / size / HIT_PX]);
+      const options = (this.hasKnobs(handle) ? Object.entries(knobs) : []).map(([part, knob]) => [part, offRay(ray, knob) / size / HIT_PX]);
       const floor = onPlane(ray, at[2]);
       if ((handle.x || handle.y) && floor) options.push(["xy", Math.min(length(subtract(floor, at)) / size / (RING_PX + 6), offRay(ray, at) / size / HIT_PX)]);
       for (const [part, share] of options) {

@@ -15,7 +15,7 @@ class LiveApp extends App {
     this.figures = new Figures(this);
     this.outcome = new Outcome(this);
     for (const action of BUTTONS) byId(action).addEventListener("click", () => this.act(action));
-    byId("file-take").addEventListener("click", () => this.act("take"));
+    byId("file-reload").addEventListener("click", () => this.act("reload"));
     byId("file-keep").addEventListener("click", () => this.act("keep"));
     byId("copy").addEventListener("click", () => navigator.clipboard?.writeText(byId("history").value));
     for (const name of Object.keys(this.overlay.shown)) {
@@ -134,10 +134,14 @@ class LiveApp extends App {
       this.outcome.progress({ work: action, fraction: 0, text: "begins" });
     }
     if (action === "stop") this.outcome.done();
-    if (action === "take" || action === "keep") byId("file").hidden = true;
-    const selected = this.handles.selected;
-    const argument = action === "map" ? (selected?.prefix === "base" ? selected.index : 0) : undefined;
-    return this.client.act(action, argument);
+    if (action === "reload" || action === "keep") byId("file").hidden = true;
+    return this.client.act(action, action === "map" ? this.mapped() : undefined);
+  }
+
+  /** Number of the robot whose base is mapped: the selected one, else the first with a task. */
+  mapped() {
+    const { selected } = this.handles;
+    return selected?.prefix === "base" ? selected.index : this.stage.scene.tasks[0].robot;
   }
 
   /** The session has ended: say so, and leave what was changed to be copied. */

@@ -20,7 +20,10 @@ class Outcome {
       verdict: () => this.verdict(event),
       trial: () => this.offer(event.text, event.values),
       remedies: () => this.remedies(event.remedies),
-      tiles: () => this.app.overlay.putTiles(event),
+      tiles: () => {
+        this.app.overlay.putTiles(event);
+        byId("outcome-panel").hidden = false;
+      },
       file: () => this.file(event),
       failed: () => this.say(`${event.work} failed: ${event.text}`, "mark"),
       end: () => this.app.leave(event.text || "the session has ended"),
@@ -80,7 +83,7 @@ class Outcome {
     byId("file").hidden = state === "saved";
     byId("file").className = state;
     byId("file-choice").hidden = state !== "conflict";
-    if (state === "conflict") byId("file-take").focus();
+    if (state === "conflict") byId("file-reload").focus();
     if (state === "changed") this.app.reopen();
   }
 }

@@ -3,8 +3,8 @@
 const ACCENT = [0.1, 0.42, 0.85, 1];
 const ADVICE_COLOUR = [0.05, 0.6, 0.35, 1];
 const RANGE_COLOUR = [0.1, 0.42, 0.85, 0.55];
-const TILE_COLOURS = { certified: [0.3, 0.68, 0.42], planned: [0.45, 0.74, 0.5], "breaks off": [0.9, 0.66, 0.3], fails: [0.82, 0.42, 0.38] };
-const TILE_UNKNOWN = [0.6, 0.62, 0.66];
+const TILE_COLOURS = { passes: "#55ad7c", collision: "#e6a7a0", speed: "#eccb85", limit: "#b9c0ca", out_of_reach: "#f1f3f6", not_judged: "#8a6fb0" };
+const TILE_TEXTS = { passes: "passes", collision: "collision or too near", speed: "too fast", limit: "beyond a joint limit", out_of_reach: "out of reach", not_judged: "not judged" };
 const GHOST_OPACITY = 0.22;
 const ARROW_PX = 110; // length of an arrow of advice
 const CIRCLE = Array.from({ length: 49 }, (_, i) => (2 * Math.PI * i) / 48);
@@ -23,6 +23,7 @@ class Overlay {
     this.square = stage.geometries.push(gridded(boxSurface([1, 1, 1]))) - 1;
     view.replace(this.square, stage.geometries[this.square]);
     this.tiles.clear();
+    byId("legend").replaceChildren();
     this.ghost = null;
   }
 
@@ -36,6 +37,10 @@ class Overlay {
     if (event.robot !== this.tilesOf) this.tiles.clear();
     this.tilesOf = event.robot;
     for (const tile of event.tiles) this.tiles.set(`${tile.x_mm},${tile.y_mm}`, { ...tile, size: event.size_mm });
+    const states = Object.keys(TILE_COLOURS).filter((state) => [...this.tiles.values()].some((tile) => tile.state === state));
+    byId("legend").replaceChildren(`base of ${event.robot}: `, ...states.map((state) => (
+      element("span", {}, element("span", { className: "swatch", style: `background:${TILE_COLOURS[state]}` }), `${TILE_TEXTS[state]} `)
+    )));
   }
 
   lines(state) {
@@ -59,7 +64,7 @@ class Overlay {
     const lines = [];
     const draw = (points) => lines.push(overlayLine(points, isSelected ? ACCENT : [...ACCENT.slice(0, 3), 0.7], width));
     if (handle.x || handle.y) draw(circle(at, RING_PX * size));
-    for (const knob of Object.values(knobs)) {
+    for (const knob of handles.hasKnobs(handle) ? Object.values(knobs) : []) {
       draw([at, knob]);
       draw(circle(knob, 6 * size));
       draw(circle(knob, 2 * size));
@@ -110,7 +115,8 @@ class Overlay {
     return [...this.tiles.values()].map((tile) => {
       const size = tile.size / 1000;
       const height = floor + 0.001 + 0.002 / (1 + 10 * size);
-      const colour = TILE_COLOURS[tile.state] ?? TILE_UNKNOWN;
+      const text = TILE_COLOURS[tile.state] ?? TILE_COLOURS.not_judged;
+      const colour = [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16) / 255);
       const place = multiply(translation([tile.x_mm / 1000, tile.y_mm / 1000, height]), scaling([0.96 * size, 0.96 * size, 1e-4]));
       return { geometry: this.square, place: multiply(place, translation([-0.5, -0.5, 0])), colour: isDark() ? times(colour, 0.6) : colour };
     });
