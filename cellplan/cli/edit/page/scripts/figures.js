@@ -13,7 +13,8 @@ class Figures {
     byId("state").textContent = `${MARKS[answer.state]} ${answer.state}`;
     byId("state").className = STATE_CLASS[answer.state];
     byId("verdict").textContent = answer.verdict.replace(`${answer.state}: `, "");
-    byId("lost").textContent = answer.lost_at === null ? "" : `gets to ${seconds(answer.lost_at)}`;
+    byId("verdict").title = answer.verdict;
+    byId("lost").textContent = answer.lost_at === null ? "" : answer.lost_at > 0 ? `gets to ${seconds(answer.lost_at)}` : "does not begin";
     byId("settling").textContent = answer.is_settled ? "" : "…";
     if (answer.is_settled) byId("spoken").textContent = `${answer.state}: ${answer.verdict}`;
     byId("figures").replaceChildren(...answer.figures.map((figure) => this.row(figure)));

@@ -157,7 +157,6 @@ class Handles {
 
   select(handle) {
     this.selected = handle;
-    byId("selected").textContent = handle ? `${handle.subject} is selected: arrow keys move it` : "";
     this.app.refresh();
   }
 

@@ -127,7 +127,7 @@ class LiveApp extends App {
     this.change(values);
   }
 
-  act(action) {
+  act(action, argument) {
     const working = Object.values(KEY_ACTIONS).includes(action);
     if (working) {
       this.outcome.clear();
@@ -135,7 +135,7 @@ class LiveApp extends App {
     }
     if (action === "stop") this.outcome.done();
     if (action === "reload" || action === "keep") byId("file").hidden = true;
-    return this.client.act(action, action === "map" ? this.mapped() : undefined);
+    return this.client.act(action, action === "map" ? this.mapped() : argument);
   }
 
   /** Number of the robot whose base is mapped: the selected one, else the first with a task. */
@@ -198,6 +198,13 @@ function viewOf(record) {
 }
 
 class LiveControls extends Controls {
+  /** The bar stays where a motion does not begin, so that the picture is not moved below the pointer. */
+  setScene() {
+    super.setScene();
+    byId("transport").hidden = false;
+    byId("curve").setAttribute("aria-label", "largest share of a limit over time; what is beyond is marked red");
+  }
+
   curve() {
     const { answer, stage } = this.app;
     if (!answer) return [];
@@ -226,7 +233,9 @@ class LiveControls extends Controls {
 }
 
 class LivePanels extends Panels {
+  /** In place of the closest pair of a run: what is selected. */
   nearestText() {
-    return [];
+    const { selected } = this.app.handles;
+    return selected ? [`${selected.subject} is selected: arrow keys move it`] : [];
   }
 }

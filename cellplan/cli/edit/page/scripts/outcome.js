@@ -18,7 +18,7 @@ class Outcome {
       answer: () => this.app.apply(event.answer),
       progress: () => this.progress(event),
       verdict: () => this.verdict(event),
-      trial: () => this.offer(event.text, event.values),
+      trial: () => this.offer(event.text, event),
       remedies: () => this.remedies(event.remedies),
       tiles: () => {
         this.app.overlay.putTiles(event);
@@ -58,13 +58,13 @@ class Outcome {
     this.done();
     this.clear();
     if (!remedies.length) this.say("no remedy was found");
-    for (const { title, text, values } of remedies) this.offer(`${title}: ${text}`, values);
+    for (const remedy of remedies) this.offer(`${remedy.title}: ${remedy.text}`, remedy);
   }
 
-  /** A button that takes values. */
-  offer(text, values) {
+  /** A button that takes what is offered: by its number where the session has one for it, else by its values. */
+  offer(text, { number, values }) {
     const button = element("button", { type: "button", className: "jump", textContent: text });
-    button.addEventListener("click", () => this.app.change(values));
+    button.addEventListener("click", () => (number === undefined ? this.app.change(values) : this.app.act("take", number)));
     byId("outcome").append(element("li", {}, button));
     byId("outcome-panel").hidden = false;
   }
