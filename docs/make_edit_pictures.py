@@ -35,7 +35,8 @@ def main() -> None:
             repaired(browser)
             browser.run("app.camera.look('oblique'); await drawn();")
             shoot(browser, "certified.png")
-            browser.run("app.switchTheme(); app.change({'robots.kuka.base.y_mm': app.wanted['robots.kuka.base.y_mm'] + 250});")
+            place = "robots.kuka.base.y_mm"
+            browser.run(f"app.switchTheme(); app.change({{ '{place}': app.wanted['{place}'] + 250 }});")
             settled(browser)
             shoot(browser, "moved.png")
 

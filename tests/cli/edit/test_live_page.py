@@ -221,10 +221,11 @@ def test_advice_is_an_arrow_and_a_button_that_moves_the_base(page: Browser, sess
     assert session.record["answer"]["values"]["robots.right.base.y_mm"] == before + 20.0
 
 
+TILE = {"x_mm": 0, "y_mm": 0, "value": 1, "state": "passes"}
 EVENTS: list[dict[str, Any]] = [
     {"event": "progress", "work": "improve", "fraction": 0.5, "text": "trial 3"},
     {"event": "trial", "work": "improve", "text": "margin 12 deg", "values": {"robots.left.base.x_mm": 44}},
-    {"event": "tiles", "robot": "left", "size_mm": 200, "tiles": [{"x_mm": 0, "y_mm": 0, "value": 1, "state": "passes"}]},
+    {"event": "tiles", "robot": "left", "size_mm": 200, "tiles": [TILE]},
     {"event": "file", "state": "conflict", "text": "the file was changed"},
 ]
 
