@@ -249,7 +249,7 @@ def test_events_show_progress_trials_tiles_and_the_question_of_a_conflict(page: 
 
 def test_an_answer_that_another_page_caused_arrives(page: Browser, session: FakeSession) -> None:
     session.events.put({"event": "answer", "answer": session.change({"robots.left.base.x_mm": 77.0}, None)})
-    page.run("while (app.wanted['robots.left.base.x_mm'] !== 77) await drawn(); await drawn();")
+    page.run("while (app.desired['robots.left.base.x_mm'] !== 77) await drawn(); await drawn();")
 
     assert page.run("return document.querySelector('[data-address=\"robots.left.base.x_mm\"]').value;") == "77"
 
@@ -259,7 +259,7 @@ def test_a_refused_change_is_said_and_the_values_stay(page: Browser, session: Fa
     page.run(f"app.change({{ 'robots.left.base.x_mm': 50 }}); {IDLE}")
 
     assert session.refusal in page.text("outcome")
-    assert page.run("return app.wanted['robots.left.base.x_mm'];") == 0
+    assert page.run("return app.desired['robots.left.base.x_mm'];") == 0
 
 
 def test_another_block_is_shown_when_it_is_pressed(page: Browser, session: FakeSession) -> None:

@@ -19,7 +19,7 @@ class RefusedError extends Error {}
 /** No answer: the session has ended, or does not reply. */
 class GoneError extends Error {}
 
-/** What the network promises; its failures are told from our own. */
+/** What the network promises; its failures are of another kind than our own. */
 function answered(promise) {
   return promise.catch((error) => {
     throw new GoneError(error.message);
@@ -84,7 +84,7 @@ class Client {
     });
   }
 
-  /** Run a request; a refusal is told, and a session that does not answer is gone. */
+  /** Run a request; a refusal is shown, and a session that does not answer is gone. */
   async guarded(request) {
     try {
       await request();

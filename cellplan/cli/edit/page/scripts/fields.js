@@ -31,7 +31,7 @@ class Fields {
     input.addEventListener("input", () => {
       if (Number.isFinite(input.valueAsNumber)) this.app.change({ [address]: input.valueAsNumber });
     });
-    input.addEventListener("change", () => this.update(this.app.wanted, true));
+    input.addEventListener("change", () => this.update(this.app.desired, true));
     input.addEventListener("keydown", (event) => this.step(event, variable));
     const range = variable.is_varied ? `, ${shortest(variable.lower)} to ${shortest(variable.upper)} ${unit}` : "";
     const title = `${address}, in the file ${shortest(variable.given)} ${unit}${range}${variable.is_locked ? ", locked" : ""}`;
@@ -44,8 +44,8 @@ class Fields {
     if (!way || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     const { address } = variable;
-    this.app.change({ [address]: this.app.wanted[address] + way * (event.shiftKey ? 10 : 1) });
-    this.update(this.app.wanted, true);
+    this.app.change({ [address]: this.app.desired[address] + way * (event.shiftKey ? 10 : 1) });
+    this.update(this.app.desired, true);
   }
 
   /** Show values; the field that is being typed in stays, unless all are meant. */

@@ -16,7 +16,7 @@ class Handles {
     this.held = null;
     for (const name of Object.keys(GRIDS)) byId("grid").append(element("option", { textContent: name }));
     byId("grid").addEventListener("change", (event) => { this.grid = GRIDS[event.target.value]; });
-    const stage = byId("stage"); // hears the pointer before the camera does
+    const stage = byId("stage"); // receives the pointer before the camera does
     stage.addEventListener("pointerdown", (event) => this.press(event), { capture: true });
     stage.addEventListener("pointermove", (event) => this.drag(event), { capture: true });
     for (const kind of ["pointerup", "pointercancel"]) stage.addEventListener(kind, (event) => this.release(event), { capture: true });
@@ -43,11 +43,11 @@ class Handles {
     return bodies.findIndex((body) => body.kind === "obstacle" && body.name === subject);
   }
 
-  /** Pose as answered, moved by what is wanted beyond that: place in m, heading in rad. */
+  /** Pose as answered, moved by what is desired beyond that: place in m, heading in rad. */
   place(handle) {
     const { stage } = this.app;
     const pose = handle.prefix === "base" ? stage.bases[handle.index] : stage.poses[handle.index];
-    const off = (part) => (handle[part] ? this.app.wanted[handle[part].address] - this.app.answer.values[handle[part].address] : 0);
+    const off = (part) => (handle[part] ? this.app.desired[handle[part].address] - this.app.answer.values[handle[part].address] : 0);
     const at = [pose[12] + off("x") / 1000, pose[13] + off("y") / 1000, pose[14] + off("z") / 1000];
     return { at, heading: Math.atan2(pose[1], pose[0]) + radians(off("yaw")) };
   }
@@ -109,7 +109,7 @@ class Handles {
     byId("canvas").focus();
     byId("canvas").setPointerCapture(event.pointerId);
     const { at } = this.place(hit.handle);
-    this.held = { ...hit, pointer: event.pointerId, at, from: this.pointed(event, hit.part, at), given: { ...this.app.wanted } };
+    this.held = { ...hit, pointer: event.pointerId, at, from: this.pointed(event, hit.part, at), given: { ...this.app.desired } };
     this.app.refresh();
   }
 
@@ -180,7 +180,7 @@ class Handles {
   }
 
   shift(variable, by) {
-    if (variable) this.app.change({ [variable.address]: this.app.wanted[variable.address] + by });
+    if (variable) this.app.change({ [variable.address]: this.app.desired[variable.address] + by });
     return true;
   }
 }

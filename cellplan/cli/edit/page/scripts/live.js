@@ -36,7 +36,7 @@ class LiveApp extends App {
     document.title = `${record.cell}: live cell`;
     this.version = -1;
     this.stage.moved = true; // distances of the start are not those of an answer
-    this.wanted = record.answer.values;
+    this.desired = record.answer.values;
     this.bases.setScene();
     this.handles.setScene();
     this.overlay.setScene();
@@ -64,10 +64,10 @@ class LiveApp extends App {
     this.version = answer.version;
     this.answer = answer;
     const isBusy = this.client.isSending && this.client.waiting;
-    this.wanted = isBusy || this.handles.held ? { ...answer.values, ...this.wanted } : { ...answer.values };
+    this.desired = isBusy || this.handles.held ? { ...answer.values, ...this.desired } : { ...answer.values };
     this.pose(answer);
     if (answer.state === "certified") this.overlay.keepGhost(answer);
-    this.bases.update(this.wanted);
+    this.bases.update(this.desired);
     this.figures.show(answer);
     this.controls.setScene();
     this.refresh();
@@ -109,9 +109,9 @@ class LiveApp extends App {
       if (variable && !variable.is_locked) sent[address] = clamp(value, variable.lower, variable.upper);
     }
     if (block === undefined && Object.keys(sent).length === 0) return;
-    this.wanted = { ...this.wanted, ...sent };
+    this.desired = { ...this.desired, ...sent };
     this.client.change(sent, block);
-    this.bases.update(this.wanted);
+    this.bases.update(this.desired);
     this.refresh();
   }
 
@@ -122,7 +122,7 @@ class LiveApp extends App {
     const values = {};
     ["x", "y", "z"].forEach((axis, i) => {
       const variable = handle[axis];
-      if (variable) values[variable.address] = this.handles.snapped(variable, this.wanted[variable.address] + advice.step_mm * unit(advice.direction)[i]);
+      if (variable) values[variable.address] = this.handles.snapped(variable, this.desired[variable.address] + advice.step_mm * unit(advice.direction)[i]);
     });
     this.change(values);
   }
@@ -156,8 +156,8 @@ class LiveApp extends App {
   refused(text) {
     this.outcome.done();
     this.outcome.say(text, "mark");
-    if (this.answer) this.wanted = { ...this.answer.values };
-    this.bases.update(this.wanted, true);
+    if (this.answer) this.desired = { ...this.answer.values };
+    this.bases.update(this.desired, true);
     this.refresh();
   }
 

@@ -76,10 +76,10 @@ class Overlay {
   rangeLines(handle) {
     const { x, y, yaw } = handle;
     const { at, heading } = this.app.handles.place(handle);
-    const { wanted } = this.app;
+    const { desired } = this.app;
     const lines = [];
     const end = (variable, bound, axis) => (
-      variable?.is_varied ? at[axis] + (variable[bound] - wanted[variable.address]) / 1000 : at[axis]
+      variable?.is_varied ? at[axis] + (variable[bound] - desired[variable.address]) / 1000 : at[axis]
     );
     if (x?.is_varied || y?.is_varied) {
       const [a, b, c, d] = [end(x, "lower", 0), end(x, "upper", 0), end(y, "lower", 1), end(y, "upper", 1)];
@@ -87,7 +87,7 @@ class Overlay {
     }
     if (yaw?.is_varied) {
       const radius = 0.85 * KNOB_PX * this.app.handles.pixel(at);
-      const [from, to] = [yaw.lower, yaw.upper].map((bound) => heading + radians(bound - wanted[yaw.address]));
+      const [from, to] = [yaw.lower, yaw.upper].map((bound) => heading + radians(bound - desired[yaw.address]));
       const arc = CIRCLE.map((angle) => from + (angle / (2 * Math.PI)) * (to - from));
       lines.push(overlayLine([at, ...arc.map((angle) => add(at, times([Math.cos(angle), Math.sin(angle), 0], radius))), at], RANGE_COLOUR, 2));
     }
@@ -104,8 +104,8 @@ class Overlay {
   arrow(advice) {
     const [from, to] = this.arrowEnds(advice);
     const along = subtract(to, from);
-    const aside = Math.abs(along[2]) > 0.9 * length(along) ? cross(along, [1, 0, 0]) : cross(along, [0, 0, 1]);
-    const barb = (sign) => add(add(from, times(along, 0.8)), times(unit(aside), sign * 0.12 * length(along)));
+    const across = Math.abs(along[2]) > 0.9 * length(along) ? cross(along, [1, 0, 0]) : cross(along, [0, 0, 1]);
+    const barb = (sign) => add(add(from, times(along, 0.8)), times(unit(across), sign * 0.12 * length(along)));
     return overlayLine([from, to, barb(1), barb(-1), to], ADVICE_COLOUR, 5);
   }
 
