@@ -9,9 +9,8 @@ across the tool's axis. Unit axes a within a cone about given ones lie in a cap 
 :math:`|a| \le 1, n \cdot a \ge \cos\delta`. Vectors of the cap stay in the cone when they are normalised, the
 objective does not stay the same; the bound holds for all unit axes of the cone, as the cap contains them.
 
-The method is that of logarithmic barriers ([Boyd2004]_ Ch. 11). Multipliers :math:`1 / (t s)` of slacks s are feasible
-for the dual problem; the minimum of their Lagrangian, a quadratic of the same band, is a lower bound whatever their
-accuracy.
+The method is a primal-dual one of interior points ([Boyd2004]_ 11.7). Its positive multipliers are feasible for the
+dual problem; the minimum of their Lagrangian, a quadratic of the same band, is a lower bound whatever their accuracy.
 """
 
 from dataclasses import dataclass
@@ -24,12 +23,14 @@ from cellplan.geometry.arrays import Array, Flags, Indices
 BLOCK: Final = 16  # points of a block of the matrix; differences of a closed chain couple points up to 4 apart
 SAME: Final = 1e-6  # [-] of the objective: a gap to its bound below this ends the search
 NO_ROUGHNESS: Final = 1e-12  # [-] of the objective of the given points: smaller is rounding
-GROWTH: Final = 10.0  # [-] by which the weight of the objective grows from one centre to the next
-MOST_CENTRES: Final = 30
-MOST_STEPS: Final = 40  # steps of Newton to one centre
-CENTRED: Final = 1e-6  # [-] square of Newton's decrement at a centre
-ARMIJO: Final = 0.1  # [-] of the decrease that a step promises
-SHORTEST_STEP: Final = 1e-10  # [-] of a step of Newton: a shorter one is rounding
+ROUNDED: Final = 1e-3  # [-] of that gap, by the multipliers: smaller is rounding, whatever the bound
+MOST_STEPS: Final = 100  # of Newton; thirty are usual
+INSIDE: Final = 0.99  # [-] of each slack and multiplier that a step uses at most
+CENTRED: Final = 1e-3  # [-] of the mean of products of slacks and multipliers: none is less
+SHORTER: Final = 0.8  # [-] of a step that leaves a lesser one
+SHORTEST_STEP: Final = 1e-8  # [-] of a step of Newton: a shorter one is rounding
+LONG_STEP: Final = 0.5  # [-] of a step of Newton: after a longer one …
+CENTRING: Final = (0.1, 0.5)  # [-] … products of slacks and multipliers become this share of their mean, else that one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,19 +44,19 @@ class Tube:
     inside: Array  # deviations with positive slacks, shape (N, 3)
 
     @classmethod
-    def of_positions(cls, normals: Array | None, count: int, *, radius: float, into: float) -> Self:
-        """Deviations up to a radius, and along unit normals, shape (N, 3), up to ``into``, above minus the radius."""
-        zero = np.zeros((count, 3))
+    def of_positions(cls, normals: Array | None, radius: Array, *, into: Array) -> Self:
+        """Deviations up to radii, shape (N,), along unit normals, shape (N, 3), up to ``into``, above minus them."""
+        zero = np.zeros((len(radius), 3))
         w = zero if normals is None else -normals
-        height = 1.0 if normals is None else into
-        start = 0.5 * (min(into, 0.0) - radius) if into < radius else 0.0
-        return cls(k=np.full(count, radius**2), m=zero, h=np.full(count, height), w=w, inside=-start * w)
+        height = np.ones(len(radius)) if normals is None else into
+        start = np.where(into < radius, 0.5 * (np.minimum(into, 0.0) - radius), 0.0)
+        return cls(k=radius**2, m=zero, h=height, w=w, inside=-start[:, None] * w)
 
     @classmethod
-    def of_axes(cls, axes: Array, *, angle: float) -> Self:
-        """Unit axes, shape (N, 3), up to an angle in [rad] below a right one away from given ones, or shorter ones."""
+    def of_axes(cls, axes: Array, angle: Array) -> Self:
+        """Unit axes, shape (N, 3), or shorter ones, up to angles in [rad], shape (N,), below right ones away."""
         height = 2.0 * np.sin(0.5 * angle) ** 2
-        return cls(k=np.zeros(len(axes)), m=axes, h=np.full(len(axes), height), w=axes, inside=-0.5 * height * axes)
+        return cls(k=np.zeros(len(axes)), m=axes, h=height, w=axes, inside=-0.5 * height[:, None] * axes)
 
     def slacks(self, e: Array) -> tuple[Array, Array]:
         """How much is left of both bounds at deviations, shape (N,) each."""
@@ -127,16 +128,35 @@ class _Problem:
 
     def solved(self) -> tuple[Array, float]:
         """Deviations, shape (N, 3), and a lower bound of the objective."""
-        free = self._is_free
-        e, t, bound = self._tube.inside * free[:, None], 2.0 * np.count_nonzero(free), 0.0
-        for _ in range(MOST_CENTRES):
-            e = self._centred(e, t)
-            bound = max(bound, self._dual_value(e, t))
-            value = self._value(e)
-            if value - bound <= max(SAME * value, NO_ROUGHNESS):
-                break
-            t *= GROWTH
-        return e, bound
+        e, bound = self._tube.inside * self._is_free[:, None], 0.0
+        slacks = self._slacks(e)
+        multipliers = self._value(e) / (slacks.size * slacks)
+        centring = CENTRING[0]
+        for _ in range(MOST_STEPS):
+            value, gap = self._value(e), float(np.sum(multipliers * slacks))
+            room = max(SAME * value, NO_ROUGHNESS)
+            if gap <= room:
+                bound = max(bound, self._dual_value(e, multipliers))
+            if value - bound <= room or gap <= ROUNDED * room:
+                return e, bound
+            step, change = self._newton(e, multipliers, slacks, mean=centring * gap / slacks.size)
+            length = self._length(e, step, change, multipliers=multipliers, slacks=slacks)
+            while not _is_centred(self._slacks(e + length * step), multipliers + length * change):
+                length *= SHORTER
+                if length < SHORTEST_STEP:  # rounding: what is reached has a bound too
+                    return e, max(bound, self._dual_value(e, multipliers))
+            e, multipliers = e + length * step, multipliers + length * change
+            slacks = self._slacks(e)
+            centring = CENTRING[0] if length > LONG_STEP else CENTRING[1]
+        return e, max(bound, self._dual_value(e, multipliers))
+
+    def _slacks(self, e: Array) -> Array:
+        """What is left of both bounds at the free points, shape (2, F)."""
+        return np.stack(self._tube.slacks(e))[:, self._is_free]
+
+    def _outward(self, e: Array) -> tuple[Array, Array]:
+        """Gradients of both slacks at the free points, away from the inside, shape (F, 3) each."""
+        return 2.0 * (self._tube.m + e)[self._is_free], -self._tube.w[self._is_free]
 
     def _value(self, e: Array) -> float:
         """The objective."""
@@ -146,68 +166,67 @@ class _Problem:
         return self._rough + np.einsum("rj,rjc->rc", self._weights, e[self._points])
 
     def _gradient(self, e: Array) -> Array:
-        """Derivative of the objective, shape (N, 3)."""
+        """Derivative of the objective at the free points, shape (F, 3)."""
         gradient, residual = np.zeros_like(e), self._residual(e)
         for j in range(3):
             np.add.at(gradient, self._points[:, j], self._weights[:, j, None] * residual)
-        return gradient
+        return gradient[self._is_free]
 
-    def _barrier(self, e: Array, t: float) -> float:
-        """Weighted objective with the barriers of free points; inf outside the tube."""
-        ball, plane = (slack[self._is_free] for slack in self._tube.slacks(e))
-        if min(ball.min(), plane.min()) <= 0.0:
-            return np.inf
-        return t * self._value(e) - float(np.log(ball).sum() + np.log(plane).sum())
+    def _newton(self, e: Array, multipliers: Array, slacks: Array, *, mean: float) -> tuple[Array, Array]:
+        """Newton's step of deviations and multipliers to products of slacks and multipliers that are all ``mean``."""
+        outward = self._outward(e)
+        curvature = 2.0 * multipliers[0][:, None, None] * np.eye(3)
+        right = -self._gradient(e)
+        for normal, multiplier, slack in zip(outward, multipliers, slacks, strict=True):
+            curvature = curvature + (multiplier / slack)[:, None, None] * normal[:, :, None] * normal[:, None, :]
+            right = right - (mean / slack)[:, None] * normal
+        step = self._solve(curvature, right)
+        inner = step[self._is_free]
+        moved = np.stack([np.sum(normal * inner, axis=1) for normal in outward])
+        return step, (mean + multipliers * moved) / slacks - multipliers
 
-    def _centred(self, e: Array, t: float) -> Array:
-        """The minimum of the barrier function with a weight of the objective, by Newton's method."""
-        free = self._is_free[:, None]
-        level = self._barrier(e, t)
-        for _ in range(MOST_STEPS):
-            ball, plane = (np.where(self._is_free, slack, 1.0)[:, None] for slack in self._tube.slacks(e))
-            of_ball, of_plane = 2.0 * (self._tube.m + e) / ball * free, -self._tube.w / plane * free
-            gradient = t * self._gradient(e) + of_ball + of_plane
-            curvature = 2.0 * np.eye(3) / ball[:, :, None]
-            for normal in (of_ball, of_plane):
-                curvature = curvature + normal[:, :, None] * normal[:, None, :]
-            step = -self._solve(t, curvature, gradient)
-            promised = -float(np.sum(gradient * step))
-            if not promised > CENTRED:
-                break
-            share = 1.0
-            while (lower := self._barrier(e + share * step, t)) > level - ARMIJO * share * promised:
-                share *= 0.5
-                if share < SHORTEST_STEP:
-                    return e
-            e, level = e + share * step, lower
-        return e
+    def _length(self, e: Array, step: Array, change: Array, *, multipliers: Array, slacks: Array) -> float:
+        """The share of a step, at most 1, that leaves a part of every slack and multiplier."""
+        inner, most = step[self._is_free], INSIDE * slacks
+        falls = np.stack([np.sum(normal * inner, axis=1) for normal in self._outward(e)])
+        bends = np.outer([1.0, 0.0], np.sum(inner**2, axis=1))  # a slack falls by falls x + bends x^2 at a share x
+        shares = 2.0 * most / np.maximum(falls + np.sqrt(falls**2 + 4.0 * bends * most), 2.0 * most)
+        of_multipliers = INSIDE * multipliers / np.maximum(-change, INSIDE * multipliers)
+        return float(min(shares.min(), of_multipliers.min()))
 
-    def _dual_value(self, e: Array, t: float) -> float:
-        """The minimum of the Lagrangian with the multipliers of a centre: no feasible objective is less."""
-        free = self._is_free[:, None]
-        slacks = (np.where(self._is_free, slack, np.inf)[:, None] for slack in self._tube.slacks(e))
-        ball, plane = (1.0 / (t * slack) for slack in slacks)
-        curvature = 2.0 * ball[:, :, None] * np.eye(3)
+    def _dual_value(self, e: Array, multipliers: Array) -> float:
+        """A lower bound of the Lagrangian with some multipliers, from near its minimum: no feasible objective is less.
+
+        Its second derivative is at least twice the multipliers of the balls, so a rest of its gradient is allowed for.
+        """
+        curvature = 2.0 * multipliers[0][:, None, None] * np.eye(3)
         for _ in range(2):  # the second removes the rounding of the first
-            gradient = self._gradient(e) + 2.0 * ball * (self._tube.m + e) * free - plane * self._tube.w
-            e = e - self._solve(1.0, curvature, gradient)
-        of_ball, of_plane = self._tube.slacks(e)
-        return self._value(e) - float(ball[:, 0] @ of_ball + plane[:, 0] @ of_plane)
+            e = e - self._solve(curvature, self._of_lagrangian(e, multipliers))
+        rest = float(np.sum(np.sum(self._of_lagrangian(e, multipliers) ** 2, axis=1) / (4.0 * multipliers[0])))
+        return self._value(e) - float(np.sum(multipliers * self._slacks(e))) - rest
 
-    def _solve(self, t: float, curvature: Array, right: Array) -> Array:
-        """Solution with the matrix ``t DᵀD`` plus blocks of shape (N, 3, 3); fixed points stay 0; shape (N, 3)."""
-        blocks = len(self._diagonal)
+    def _of_lagrangian(self, e: Array, multipliers: Array) -> Array:
+        """Derivative of the Lagrangian at the free points, shape (F, 3)."""
+        return self._gradient(e) + np.einsum("kf,kfc->fc", multipliers, np.stack(self._outward(e)))
+
+    def _solve(self, curvature: Array, right: Array) -> Array:
+        """Solution with the matrix ``DᵀD`` plus blocks of free points, shape (F, 3, 3); others stay 0; shape (N, 3)."""
+        blocks, at = len(self._diagonal), np.arange(BLOCK)
         local = np.broadcast_to(np.eye(3), (blocks * BLOCK, 3, 3)).copy()
-        local[self._order] = np.where(self._is_free[:, None, None], curvature, np.eye(3))
-        ordered = np.zeros((blocks * BLOCK, 3))
-        ordered[self._order] = np.where(self._is_free[:, None], right, 0.0)
-        matrix = t * _for_components(self._diagonal)
-        at = np.arange(BLOCK)
+        ordered, free = np.zeros((blocks * BLOCK, 3)), self._order[self._is_free]
+        local[free], ordered[free] = curvature, right
+        matrix = _for_components(self._diagonal)
         matrix.reshape(blocks, BLOCK, 3, BLOCK, 3)[:, at, :, at] += np.moveaxis(
             local.reshape(blocks, BLOCK, 3, 3), 1, 0
         )
-        x = _solve_blocks(matrix, t * _for_components(self._upper), ordered.reshape(blocks, 3 * BLOCK))
+        x = _solve_blocks(matrix, _for_components(self._upper), ordered.reshape(blocks, 3 * BLOCK))
         return x.reshape(-1, 3)[self._order]
+
+
+def _is_centred(slacks: Array, multipliers: Array) -> bool:
+    """Whether slacks are positive, and no product of one and its multiplier is far less than their mean."""
+    products = slacks * multipliers
+    return bool(slacks.min() > 0.0 and products.min() >= CENTRED * products.mean())
 
 
 def _folded(count: int) -> Indices:

@@ -26,6 +26,10 @@ def noisy_line(count: int, *, seed: int = 1) -> tuple[Array, Array]:
     return line, line + noise
 
 
+def round_tube(count: int, radius: float) -> Tube:
+    return Tube.of_positions(None, np.full(count, radius), into=np.zeros(count))
+
+
 def ends(count: int) -> Flags:
     fixed = np.zeros(count, dtype=bool)
     fixed[[0, -1]] = True
@@ -52,7 +56,7 @@ def test_roughness_of_a_parabola_is_its_second_derivative() -> None:
 def test_noise_on_a_straight_line_becomes_the_line(count: int) -> None:
     line, values = noisy_line(count)
 
-    smooth, differences = of_open(values, Tube.of_positions(None, count, radius=WIDTH, into=0.0))
+    smooth, differences = of_open(values, round_tube(count, WIDTH))
 
     assert np.abs(smooth.values - line).max() < 0.01 * WIDTH
     assert differences.roughness(smooth.values) < 1e-3 * differences.roughness(values)
@@ -66,7 +70,7 @@ def test_fixed_points_and_a_tube_that_does_not_bind_leave_least_squares() -> Non
     _, values = noisy_line(count)
     values[fixed] += np.random.default_rng(3).normal(size=(5, 3)) * 0.05
 
-    smooth, differences = of_open(values, Tube.of_positions(None, count, radius=10.0, into=0.0), fixed)
+    smooth, differences = of_open(values, round_tube(count, 10.0), fixed)
 
     matrix = np.array([differences.of(np.outer(row, EZ))[:, 2] for row in np.eye(count)]).T
     best = np.linalg.lstsq(matrix[:, ~fixed], -matrix[:, fixed] @ values[fixed], rcond=None)[0]
@@ -81,7 +85,9 @@ def test_the_bound_of_a_tube_that_binds_is_met_within_the_tube(into: float) -> N
     values += np.random.default_rng(2).uniform(-2.0, 2.0, (count, 3)) * WIDTH
     normals = np.tile(EZ, (count, 1))
 
-    smooth, differences = of_open(values, Tube.of_positions(normals, count, radius=WIDTH, into=into * WIDTH))
+    smooth, differences = of_open(
+        values, Tube.of_positions(normals, np.full(count, WIDTH), into=np.full(count, into * WIDTH))
+    )
 
     off = smooth.values - values
     assert np.linalg.norm(off, axis=1).max() <= WIDTH * (1.0 + 1e-12)
@@ -111,7 +117,7 @@ def test_another_solver_reaches_no_smoother_points() -> None:
         ],
         options={"maxiter": 500, "ftol": 1e-12},
     )
-    tube = Tube.of_positions(np.tile(EZ, (count, 1)), count, radius=WIDTH, into=0.0)
+    tube = Tube.of_positions(np.tile(EZ, (count, 1)), np.full(count, WIDTH), into=np.zeros(count))
     smooth = smoothest(values, differences, tube, fixed=ends(count))
 
     assert other.success
@@ -124,7 +130,7 @@ def test_axes_that_wobble_about_a_direction_become_that_direction() -> None:
     axes[[0, -1]] = EZ
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
 
-    smooth, _ = of_open(axes, Tube.of_axes(axes, angle=np.deg2rad(5.0)))
+    smooth, _ = of_open(axes, Tube.of_axes(axes, np.full(count, np.deg2rad(5.0))))
 
     unit = smooth.values / np.linalg.norm(smooth.values, axis=1, keepdims=True)
     assert np.abs(unit - EZ).max() < 1e-5
@@ -138,7 +144,7 @@ def test_axes_stay_in_their_cones_and_their_bound_holds_after_they_are_normalise
     axes += np.random.default_rng(6).normal(size=(count, 3)) * np.deg2rad(degrees)
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
 
-    smooth, differences = of_open(axes, Tube.of_axes(axes, angle=np.deg2rad(degrees)))
+    smooth, differences = of_open(axes, Tube.of_axes(axes, np.full(count, np.deg2rad(degrees))))
 
     lengths = np.linalg.norm(smooth.values, axis=1, keepdims=True)
     unit = smooth.values / lengths
@@ -159,7 +165,7 @@ def test_a_closed_chain_is_smoothed_alike_in_both_directions_and_has_no_kink_at_
     fixed[0] = True
     differences = Differences(np.arange(count + 1) / count, kinks=np.zeros(count, dtype=bool), is_closed=True)
     back = np.append(0, np.arange(count - 1, 0, -1))
-    tube = Tube.of_positions(None, count, radius=0.02, into=0.0)
+    tube = round_tube(count, 0.02)
 
     smooth = smoothest(values, differences, tube, fixed=fixed)
     reverse = smoothest(values[back], differences, tube, fixed=fixed)
