@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
-from cellplan.measures.tool_errors import error_lengths, relative_to_task_frame
+from cellplan.measures.tool_errors import error_lengths, errors_on_part, relative_to_task_frame
 from cellplan.model.cell.cell import RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Check
@@ -40,7 +40,7 @@ def listed_errors(schedule: Schedule, chains: Chains, q: RobotRows, X_WP: Array)
         nominal = times if schedule.clock is None else schedule.clock.at(times)
         desired = replace(path, toolpath=listed).poses(nominal)
         lengths = error_lengths(X_PT, desired, task)
-        into = np.sum((X_PT[:, :3, 3] - desired[:, :3, 3]) * desired[:, :3, 2], axis=1)
+        into = -np.sum(errors_on_part(X_PT, desired, task)[:, :3] * desired[:, :3, 2], axis=1)
         far, turned, deep = int(np.argmax(lengths[:, 0])), int(np.argmax(lengths[:, 1])), int(np.argmax(into))
         errors[task.name] = ListedErrors(
             position=float(lengths[far, 0]),

@@ -33,6 +33,7 @@ Dwell = Annotated[float, Field(ge=0.0, le=10.0)]
 WeaveSide = Annotated[Mm, Within(gt=0.0, le=FARTHEST_MM)]
 OF_OUTLINES: Final = ("work_deg", "push_deg", "drag_deg", "standoff_mm", "reverse")  # keys of a seam that they have
 OF_RASTERS: Final = ("standoff_mm",)
+OF_SMOOTHED: Final = ("from_mm", "to_mm", "reverse", "overlap_mm", "back_mm", "weave")  # where they are of its curve
 OF_FEED: Final = ("frequency_hz", "dwell_left_s", "dwell_right_s")  # keys whose lengths follow from the feed
 
 
@@ -167,8 +168,10 @@ class PathEntry(PathShapeEntry):
         """Angles have walls, walls have angles, and one of the walls is what the work angle is measured from."""
         if self.push_deg is not None and self.drag_deg is not None:
             raise rule("expected either push_deg or drag_deg, got both", "drag_deg")
-        if self.smooth is not None and self.seam_keys:
-            raise rule("unexpected key beside smooth, which is for a path as its file has it", self.seam_keys[0])
+        for key in self.seam_keys if self.smooth is not None and not self.is_programmed else ():
+            if key not in OF_SMOOTHED:
+                text = "unexpected key beside smooth, which smooths tool axes that are stated, not those held to walls"
+                raise rule(text, key)
         if self.is_edge:
             self._require_no_walls()
             return self

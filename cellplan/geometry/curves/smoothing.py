@@ -134,10 +134,10 @@ class _Problem:
         centring = CENTRING[0]
         for _ in range(MOST_STEPS):
             value, gap = self._value(e), float(np.sum(multipliers * slacks))
-            room = max(SAME * value, NO_ROUGHNESS)
-            if gap <= room:
+            negligible = max(SAME * value, NO_ROUGHNESS)
+            if gap <= negligible:
                 bound = max(bound, self._dual_value(e, multipliers))
-            if value - bound <= room or gap <= ROUNDED * room:
+            if value - bound <= negligible or gap <= ROUNDED * negligible:
                 return e, bound
             step, change = self._newton(e, multipliers, slacks, mean=centring * gap / slacks.size)
             length = self._length(e, step, change, multipliers=multipliers, slacks=slacks)

@@ -1,13 +1,14 @@
 """Toolpaths: from a task as written to tool poses on the part."""
 
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from cellplan.errors import CellplanError, InputError
 from cellplan.geometry.curves.arc_length import ArcLength, measure
 from cellplan.geometry.curves.curve import Curve, smooth_through
+from cellplan.geometry.curves.extension import ExtendedCurve, ExtendedFrame
 from cellplan.geometry.curves.orientation import (
     AxisFrame,
     FixedFrame,
@@ -16,7 +17,7 @@ from cellplan.geometry.curves.orientation import (
     SpunFrame,
     rotations_through,
 )
-from cellplan.geometry.curves.rerun import RerunFrame
+from cellplan.geometry.curves.rerun import Rerun, RerunFrame
 from cellplan.geometry.curves.spline import spline_through
 from cellplan.geometry.shapes import bounding_box
 from cellplan.geometry.transforms import Array, frame_from_axes, inverse, is_rigid, pose_from, rotation_vector
@@ -31,7 +32,7 @@ from cellplan.planning.path.projection import along, project_path
 from cellplan.planning.path.runs import with_runs
 from cellplan.planning.path.seam import follow_seam
 from cellplan.planning.path.stretch import along_stretches, back_at_end, stretch_of
-from cellplan.planning.path.weave import woven_path
+from cellplan.planning.path.weave import WovenPath, woven_path
 
 STANDSTILL: Final = 1e-4  # [-] of the largest speed by the parameter: a curve slower than this has a cusp there
 SAME_POSE: Final = 1e-9  # [m], [-] entries of poses that differ by less are those of one pose
@@ -57,15 +58,17 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
     """
     outline = _outline(task)
     refuse_path_in_metres(outline.curve, task=task, part=part)
-    curve, orientation = with_runs(task, *_with_tool(task, project_path(outline, task, part)))
+    held = _with_tool(task, project_path(outline, task, part))
+    curve, orientation = with_runs(task, held.curve, held.orientation)
     arc = measure(curve.curve)
     refuse_unlikely_path(curve.curve, arc, task=task, part=part)
     is_timed = isinstance(task.path, TimedPath)
     if not is_timed:
         _refuse_standstill(curve.curve, arc, task.where("path"))
-    tip, seam = curve.curve, curve.seam
+    tip, seam, woven = curve.curve, curve.seam, None
     if task.weave is not None:
-        tip, orientation, seam = woven_path(task, task.weave, curve, arc, orientation)
+        woven = woven_path(task, task.weave, curve, arc, orientation)
+        tip, orientation, seam = woven
     is_closed = curve.is_closed and _comes_back(tip, orientation, curve.stops)
     if task.repeat > 1 and not is_closed:
         raise InputError(
@@ -89,7 +92,7 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
     )
     if not is_rigid(toolpath.spread(PROBES)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")
-    return replace(toolpath, listed=_as_listed(task, toolpath))
+    return replace(toolpath, listed=_as_listed(task, toolpath, _Drawn(held.reruns, curve.curve, woven)))
 
 
 def _outline(task: Task) -> PathCurve:
@@ -97,19 +100,53 @@ def _outline(task: Task) -> PathCurve:
     return programmed_curve(task.path) if isinstance(task.path, ProgrammedPath) else path_curve(task)
 
 
-def _as_listed(task: Task, toolpath: Toolpath) -> Toolpath | None:
-    """A smoothed path by the points of its file, at the same parameters; None for another one."""
+Reruns = tuple[Rerun | None, Rerun | None]  # along a path, and back at its end; None for all of it, and not at all
+
+
+class _HeldTool(NamedTuple):
+    """The curve of the tip along its stretches of a path, the orientation of the tool, and these stretches."""
+
+    curve: PathCurve
+    orientation: Orientation
+    reruns: Reruns
+
+
+class _Drawn(NamedTuple):
+    """How a path became a toolpath: what its curve by the file has alike."""
+
+    reruns: Reruns
+    line: Curve  # with its runs
+    woven: WovenPath | None
+
+
+def _as_listed(task: Task, toolpath: Toolpath, drawn: _Drawn) -> Toolpath | None:
+    """A smoothed path by the points of its file, at the same parameters; None for another one.
+
+    Its weave has the offsets from the smoothed line, so that the tips are as far apart as the lines are.
+    """
     if not isinstance(task.path, SampledPath) or task.path.smoothing is None:
         return None
     by_file = replace(task, path=task.path.listed)
-    curve, orientation = _with_tool(by_file, _outline(by_file))
-    return replace(toolpath, tip=curve.curve, orientation=orientation)
+    curve, orientation, _ = _with_tool(by_file, _outline(by_file), drawn.reruns)
+    tip: Curve = curve.curve
+    if isinstance(drawn.line, ExtendedCurve):
+        extension = drawn.line.extension
+        orientation = ExtendedFrame(frame=orientation, curve=tip, extension=extension)
+        tip = ExtendedCurve(curve=tip, extension=extension)
+    if drawn.woven is not None:
+        tip, orientation = drawn.woven.about(tip, orientation)
+    return replace(toolpath, tip=tip, orientation=orientation)
 
 
-def _with_tool(task: Task, path: PathCurve) -> tuple[PathCurve, Orientation]:
-    """The curve of the tip along its stretch of a path, and the orientation of the tool along it."""
+def _with_tool(task: Task, path: PathCurve, reruns: Reruns | None = None) -> _HeldTool:
+    """The curve of the tip along its stretch of a path, and the orientation of the tool along it.
+
+    Args:
+        reruns: The stretches in parameters of the path; those of the task by lengths along it when absent.
+    """
     stretch = task.stretch or Stretch()
-    rerun = None if stretch == Stretch(back=stretch.back) else stretch_of(path, stretch, task)
+    whole = stretch == Stretch(back=stretch.back)
+    rerun, back = reruns or (None if whole else stretch_of(path, stretch, task), None)
     if task.seam is None:
         orientation = orient_tool(task, path)
         curve = path if rerun is None else along_stretches(path, rerun)
@@ -118,9 +155,11 @@ def _with_tool(task: Task, path: PathCurve) -> tuple[PathCurve, Orientation]:
         curve, axes = follow_seam(task, path if rerun is None else along_stretches(path, rerun), task.seam.angles)
         orientation = _by_axes(axes, task, curve)
     if stretch.back:
-        back = back_at_end(curve, stretch.back, task)
+        back = back or back_at_end(curve, stretch.back, task)
         curve, orientation = along_stretches(curve, back), RerunFrame(frame=orientation, rerun=back)
-    return curve, SpunFrame(frame=orientation, angle=task.spin) if task.spin else orientation
+    if task.spin:
+        orientation = SpunFrame(frame=orientation, angle=task.spin)
+    return _HeldTool(curve, orientation, (rerun, back))
 
 
 def _comes_back(tip: Curve, orientation: Orientation, stops: Array) -> bool:

@@ -1,7 +1,7 @@
 """Weave: a tip that swings about its seam while it travels along it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -147,6 +147,7 @@ class WovenCurve:
     directions: tuple[tuple[int, BezierCurve], ...]  # unit vectors of the offsets that are not zero
     travel: StandingTravel | None  # of a tip that stands for the dwells; None of one that travels evenly
     knots: Array
+    about: Curve | None = None  # another line by the same parameter that the tip weaves about, with the same offsets
 
     @classmethod
     def of(cls, line: Curve, arc: ArcLength, weave: Weave, orientation: Orientation) -> "WovenCurve":
@@ -169,7 +170,7 @@ class WovenCurve:
         offsets, rates = weave_offsets(self.weave, self.arc.lengths(u))
         speed = np.linalg.norm(self.line.evaluate(u, interval)[1], axis=1, keepdims=True)
         v, within, pace = (u, interval, 1.0) if self.travel is None else self.travel.at(u, interval)
-        p, dp = self.line.evaluate(v, within)
+        p, dp = (self.about or self.line).evaluate(v, within)
         dp = pace * dp
         for k, curve in self.directions:
             d, dd = curve.evaluate(v, within)
@@ -184,6 +185,13 @@ class WovenPath(NamedTuple):
     tip: WovenCurve
     orientation: Orientation
     seam: SeamPlaces | None
+
+    def about(self, line: Curve, orientation: Orientation) -> tuple[WovenCurve, Orientation]:
+        """The same weave about another line by the same parameter, and another orientation along that."""
+        travel = self.tip.travel
+        if travel is not None:
+            orientation = StandingFrame(frame=orientation, travel=travel)
+        return replace(self.tip, about=line), orientation
 
 
 def woven_path(task: Task, weave: Weave, drawing: PathCurve, arc: ArcLength, orientation: Orientation) -> WovenPath:

@@ -12,6 +12,7 @@ from cellplan.checks.tools.listed_path import check_listed
 from cellplan.model.progress import silent
 from cellplan.model.report.report import TaskAccuracy
 from cellplan.model.report.smoothing import ListedErrors
+from cellplan.model.settings.solver import METHODS
 from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.settings.units import Deg, Mm
 from cellplan.model.task.smoothing import Smoothing
@@ -41,17 +42,21 @@ motion: {step_s: 0.01}
 LISTED = ("listed_position_error", "listed_orientation_error", "listed_depth")
 
 
-@pytest.fixture
-def solution(tmp_path: Path) -> Solution:
-    """A path along a line with noise across it, done in 2 s."""
+def solved(folder: Path, *changes: tuple[str, str]) -> Solution:
+    """A path along a line with noise across it, done in 2 s, in a cell with other words."""
     noise = np.random.default_rng(8).uniform(-0.15, 0.15, 30) * (np.arange(30) % 29 > 0)
     rows = np.stack([np.full(30, -100.0) + noise, np.linspace(-130.0, -30.0, 30), np.full(30, 6.0)], axis=1)
-    np.savetxt(tmp_path / "scan.csv", rows, fmt="%.6f", delimiter=",", header="x_mm,y_mm,z_mm", comments="")
-    (tmp_path / "cell.yaml").write_text(CELL, encoding="utf-8")
-    return solve_motion(load_cell(tmp_path / "cell.yaml"), task=None, progress=silent)[1]
+    np.savetxt(folder / "scan.csv", rows, fmt="%.6f", delimiter=",", header="x_mm,y_mm,z_mm", comments="")
+    text = CELL
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "cell.yaml").write_text(text, encoding="utf-8")
+    return solve_motion(load_cell(folder / "cell.yaml"), task=None, progress=silent)[1]
 
 
-def test_rows_are_held_against_the_points_of_the_file(solution: Solution) -> None:
+def test_rows_are_held_against_the_points_of_the_file(tmp_path: Path) -> None:
+    solution = solved(tmp_path)
     (run,) = solution.runs
     accuracy: TaskAccuracy = run.report.accuracy[0]
     path = solution.cell.tasks[0].path
@@ -96,3 +101,28 @@ def test_smoothing_and_tracking_share_the_tolerance(
     assert tuple(check.name for check in checks if not check.passed) == failed
     assert all(("a narrower path.smooth" in check.message) != check.passed for check in checks)
     assert list(check_listed(task_on(path), None)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_spends_no_more_than_the_tolerance(tmp_path: Path, method: str) -> None:
+    solution = solved(tmp_path, ("motion: {", f"solver: {{method: {method}}}\nmotion: {{"))
+
+    (run,) = solution.runs
+    accuracy: TaskAccuracy = run.report.accuracy[0]
+    assert accuracy.listed is not None
+    limits = {check.name: check.limit for check in run.report.checks}
+    assert limits["position_error"] == pytest.approx(0.1, abs=1e-12)  # what 0.2 mm of smoothing leave of 0.3 mm
+    assert limits["listed_position_error"] == pytest.approx(0.3, abs=1e-12)
+    verdicts = {check.name: check.passed for check in run.report.checks}
+    assert verdicts["listed_position_error"] == (accuracy.listed.position <= 0.3e-3)
+    assert verdicts["listed_position_error"] or not verdicts["position_error"]
+
+
+def test_depth_is_that_of_the_components_that_the_task_has(tmp_path: Path) -> None:
+    (run,) = solved(tmp_path, ("-86", "-84")).runs  # 2 mm nearer to a tool that is free along its axis
+
+    listed = run.report.accuracy[0].listed
+    assert listed is not None
+    assert abs(listed.into) < 1e-6
+    assert run.report.passed
