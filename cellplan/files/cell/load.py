@@ -26,6 +26,7 @@ from cellplan.files.cell.build.mounting import (
     rail_entries,
 )
 from cellplan.files.cell.build.path import is_woven_by_controller
+from cellplan.files.cell.build.smoothed_path import narrow_tubes
 from cellplan.files.cell.build.srdf import apply_srdfs
 from cellplan.files.cell.changes import changed, plain_values
 from cellplan.files.cell.expansion import is_of_entry, with_values
@@ -57,7 +58,7 @@ from cellplan.model.cell.mirror import mirrored_part, mirrored_task
 from cellplan.model.origin import Origin
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.program import NoTransfers
-from cellplan.model.task.task import PlaneName, TimedPath
+from cellplan.model.task.task import PlaneName, SampledPath, Task, TimedPath
 
 PART_EXTENT_MM: Final = (1.0, 20_000.0)  # smaller or larger parts are a wrong unit
 PARTS: Final = (
@@ -357,7 +358,7 @@ def _cell(
         checks=whole.checks,
         origin=origin,
         inputs=dict(sorted(sources.inputs.items())),
-        remarks=(*sources.remarks, *_weave_remarks(whole)),
+        remarks=(*sources.remarks, *_weave_remarks(whole), *_smooth_remarks(whole, tasks)),
         program=whole.program or NoTransfers(),
         controllers=whole.controllers or {},
         assign=whole.assign,
@@ -369,6 +370,15 @@ def _weave_remarks(whole: CellDocument) -> Iterator[tuple[str, str]]:
     for name, task in whole.tasks.items():
         if task.path.weave is not None and is_woven_by_controller(task, whole):
             yield f"tasks.{name}.path.weave", f"the controller of '{task.robot}' weaves, rows stay on the path"
+
+
+def _smooth_remarks(whole: CellDocument, tasks: Sequence[Task]) -> Iterator[tuple[str, str]]:
+    """Tasks whose paths are smoothed in a tube that is too narrow to gain anything."""
+    for task in tasks:
+        entry = whole.tasks[task.name].path.smooth
+        if entry is not None and isinstance(task.path, SampledPath):
+            for key, text in narrow_tubes(task.path, entry, task.tool_axis):
+                yield f"tasks.{task.name}.path.smooth.{key}", f"{task.where(f'path.smooth.{key}')}: {text}"
 
 
 def _with_source(cell: Cell, source: CellFile) -> Cell:

@@ -1,19 +1,24 @@
 """Points and tool axes of a file, smoothed within the tube that a cell allows."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from cellplan.files.schema.path import SmoothEntry
+from cellplan.files.schema.path import WIDEST_SMOOTHED_DEG, SmoothEntry
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.curves.curve import chord_lengths
 from cellplan.geometry.curves.smoothed_chain import Chain, SmoothedValues, angles_between
 from cellplan.geometry.transforms import rotation_exp
+from cellplan.model.settings.entry import FARTHEST_MM
 from cellplan.model.settings.units import si_or_none
 from cellplan.model.task.smoothing import Roughness, Smoothing
 from cellplan.model.task.task import ProgrammedPath, SampledPath
 
+GAINED: Final = 0.95  # [-] of the roughness of a file: a tube in which more is left gains nothing
+WORTH: Final = 0.8  # [-] of it: a wider tube that leaves no more is proposed
+DOUBLINGS: Final = 8  # of a tube that gains nothing, to see what a wider one does
 LEAST_SIDE: Final = 1e-9  # [m] of a path that can be smoothed; a shorter side is refused where the path is drawn
 
 
@@ -47,6 +52,31 @@ def smoothed(path: SampledPath, entry: SmoothEntry, axis: Array | None) -> Sampl
     elif turned is not None:
         path = replace(path, axes=turned.values)
     return replace(path, smoothing=smoothing)
+
+
+def narrow_tubes(path: SampledPath, entry: SmoothEntry, axis: Array | None) -> Iterator[tuple[str, str]]:
+    """Keys of the entry whose tube gains nothing on a path that was smoothed, and how wide one that does has to be."""
+    for key, field, unit in (("position_mm", "of_points", "mm"), ("direction_deg", "of_axes", "deg")):
+        tube, left = getattr(entry, key), _share(path, field)
+        if left is None or left <= GAINED:
+            continue
+        others = {"into_mm": entry.into_mm} if key == "position_mm" else {}
+        most = FARTHEST_MM if key == "position_mm" else WIDEST_SMOOTHED_DEG
+        for wider in (min(tube * 2.0**k, most) for k in range(1, DOUBLINGS + 1)):
+            tried = smoothed(path.listed, SmoothEntry.model_validate({key: wider, **others}), axis)
+            with_wider = _share(tried, field) or 0.0
+            if with_wider <= WORTH:
+                break
+        cure = f"one of {wider:g} {unit} leaves {100.0 * with_wider:.0f} %" + (
+            "; leave it out" if with_wider > WORTH else ""
+        )
+        yield key, f"gains nothing, {100.0 * left:.1f} % of the roughness of {path.source} is left; {cure}"
+
+
+def _share(path: SampledPath, field: str) -> float | None:
+    """The roughness that is left of the given one; None where there was none, or nothing is smoothed."""
+    roughness: Roughness | None = None if path.smoothing is None else getattr(path.smoothing, field)
+    return None if roughness is None or not roughness.given else roughness.smoothed / roughness.given
 
 
 def _chain(path: SampledPath, knots: Array) -> Chain:

@@ -1,5 +1,6 @@
 """Smoothed paths of files: what stays, that curves stay in their tubes between points too, and every refusal."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -116,6 +117,11 @@ def scanned(tmp_path: Path) -> Path:
     rows = np.hstack([1e3 * path.points + [0.0, 0.0, 200.0], np.asarray(path.axes)])
     np.savetxt(tmp_path / "p.csv", rows, fmt="%.6f", delimiter=",", header="x_mm,y_mm,z_mm,i,j,k", comments="")
     np.savetxt(tmp_path / "bare.csv", rows[:, :3], fmt="%.6f", delimiter=",", header="x_mm,y_mm,z_mm", comments="")
+    angles = np.linspace(0.0, 0.5 * np.pi, 30)
+    arc = np.hstack(
+        [80.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1), np.tile([250.0, 0.0, 0.0, -1.0], (30, 1))]
+    )
+    np.savetxt(tmp_path / "arc.csv", arc, fmt="%.6f", delimiter=",", header="x_mm,y_mm,z_mm,i,j,k", comments="")
     timed = np.hstack([0.1 * np.arange(40.0)[:, None], rows])
     np.savetxt(tmp_path / "t.csv", timed, fmt="%.6f", delimiter=",", header="t_s,x_mm,y_mm,z_mm,i,j,k", comments="")
     return tmp_path
@@ -140,6 +146,29 @@ def test_a_cell_has_what_smoothing_leaves_as_its_tolerance_and_is_written_as_it_
     assert isinstance(path, SampledPath)
     assert isinstance(same, SampledPath)
     assert np.array_equal(path.points, same.points)
+
+
+@pytest.mark.usefixtures("scanned")
+@pytest.mark.parametrize(
+    ("words", "remark"),
+    [
+        ("csv: p.csv, smooth: {position_mm: 0.2, direction_deg: 2}", None),
+        (
+            "csv: p.csv, smooth: {position_mm: 0.001}",
+            r"position_mm: gains nothing, 9\d.\d % of .* is left; one of 0.\d+ mm",
+        ),
+        (
+            "csv: p.csv, smooth: {direction_deg: 0.01}",
+            r"direction_deg: gains nothing, .*; one of [\d.]+ deg leaves [67]\d %",
+        ),
+        ("csv: arc.csv, smooth: {position_mm: 0.001}", r"position_mm: .* of arc.csv is left; .* 9\d %; leave it out"),
+    ],
+)
+def test_a_tube_that_gains_nothing_is_located_with_one_that_does(load: Load, words: str, remark: str | None) -> None:
+    remarks = [text for _, text in load(with_path(words)).remarks]
+
+    assert len(remarks) == (remark is not None)
+    assert all(re.match(rf"c:19: tasks\.ring\.path\.smooth\.{remark}", text) for text in remarks)
 
 
 SMOOTH = "c:19: tasks.ring.path.smooth"
