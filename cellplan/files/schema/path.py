@@ -180,7 +180,9 @@ class PathShapeEntry(OneOf):
         "not projected. An outline is drawn in the plane across it through the origin, as under `on`.",
     )
     smooth: SmoothEntry | None = setting(
-        None, "Tube round the points and axes of a file within which they are made as smooth as possible."
+        None,
+        "Tube round the points and axes of a file, an outline or a raster within which they are made as smooth as "
+        "possible.",
     )
     offset_mm: Coordinate | None = setting(
         None, "Shift of a planar path that is not projected along the plane's normal axis; 0 when absent."
@@ -197,9 +199,10 @@ class PathShapeEntry(OneOf):
             raise rule("unexpected key, a path of CAM is used as it stands in the file", "project")
         if self.is_edge and self.project is not None:
             raise rule("unexpected key, edges lie on the part already", "project")
-        if self.smooth is not None and self.file_key is None:
-            raise rule("unexpected key, only a path of a file (csv, apt, gcode) is smoothed", "smooth")
-        if self.smooth is not None and self.project is not None:
+        if self.smooth is not None and self.file_key is None and not self.is_programmed:
+            text = "unexpected key, only a path of many points (csv, apt, gcode, outline, face) is smoothed"
+            raise rule(text + ("; list them in a table" if self.polyline is not None else ""), "smooth")
+        if self.smooth is not None and self.project is not None and self.outline is None:
             raise rule("unexpected key, a projected path takes its points and normals from the part", "smooth")
         if (self.face is None) != (self.raster is None):
             text = "missing, expected how the face is rastered: {step_mm: 20}"

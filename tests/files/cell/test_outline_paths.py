@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from builders.drawings import CUT, HEAD, LINE, TAIL, entity, write_drawing
 from builders.step_files import Named, box, moved, write_step
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
@@ -36,6 +37,7 @@ tasks:
 motion: {mode: simultaneous}
 """
 PLACE = "cell.yaml:14: tasks.cut"
+TOLERANT = "    tolerance: {position_mm: 0.1, orientation_deg: 2}\n"
 AT_LEAST = 1e-9  # [m]
 
 
@@ -275,3 +277,24 @@ def test_without_the_extra_the_package_is_named(folder: Path, monkeypatch: pytes
     assert refusal(folder, f"{OUTLINE}, project: +z", BALL) == (
         "logo.dxf: expected the package ezdxf, got none: pip install 'cellplan[dxf]'"
     )
+
+
+def test_normals_of_a_rough_mesh_are_smoothed_along_an_outline(folder: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=80.0)
+    ball.vertices *= 1.0 + np.random.default_rng(1).uniform(-4e-4, 4e-4, (len(ball.vertices), 1))
+    ball.export(folder / "ball.stl")
+    part = "geometry: {mesh: ball.stl, unit: mm}"
+    outline = "outline: {file: logo.dxf, contours: [1, 3]}, layer: CUT, project: +z"
+    tube = ", smooth: {position_mm: 0.03, direction_deg: 1.5}"
+
+    rough = path_of(folder, outline, part, TOLERANT)
+    path = path_of(folder, outline + tube, part, TOLERANT)
+
+    assert path.smoothing is not None
+    for roughness, share in ((path.smoothing.of_points, 0.97), (path.smoothing.of_axes, 0.7)):
+        assert roughness is not None  # the circle itself bends by 100 /m
+        assert roughness.bound <= roughness.smoothed < share * roughness.given
+    assert np.array_equal(path.listed.points, rough.points)
+    assert 1e-5 < np.linalg.norm(path.points - rough.points, axis=1).max() <= 0.03e-3
+    assert np.array_equal(path.points[:-1][path.is_rapid], rough.points[:-1][path.is_rapid])
+    assert np.linalg.norm(path.axes - rough.axes, axis=1).max() <= np.deg2rad(1.5)

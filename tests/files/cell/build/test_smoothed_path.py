@@ -180,7 +180,12 @@ SMOOTH = "c:19: tasks.ring.path.smooth"
     [
         (
             "circle: {radius_mm: 100, plane: xy}, smooth: {position_mm: 0.1}",
-            f"{SMOOTH}: unexpected key, only a path of a file (csv, apt, gcode) is smoothed",
+            f"{SMOOTH}: unexpected key, only a path of many points (csv, apt, gcode, outline, face) is smoothed",
+        ),
+        (
+            "polyline: {points_mm: [[0, 0], [1, 2]], plane: xy}, smooth: {position_mm: 0.1}",
+            f"{SMOOTH}: unexpected key, only a path of many points (csv, apt, gcode, outline, face) is smoothed; list "
+            "them in a table",
         ),
         (
             "csv: p.csv, project: +z, smooth: {position_mm: 0.1}",
