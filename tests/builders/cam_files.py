@@ -54,6 +54,24 @@ def goto(p: Array, axis: Array) -> str:
     return f"GOTO/{p[0]:.4f},{p[1]:.4f},{p[2]:.4f},$\n  {axis[0]:.7f},{axis[1]:.7f},{axis[2]:.7f}\n"
 
 
+def as_gcode(apt: str) -> str:
+    """The same moves as G-code."""
+    text = [GCODE_HEAD]
+    move, feed = "G1", ""
+    for statement in apt.replace("$\n", "").splitlines():
+        word, _, rest = statement.partition("/")
+        if word == "RAPID":
+            move = "G0"
+        elif word == "FEDRAT":
+            feed = f" F{rest.split(',')[0]}"
+        elif word == "GOTO":
+            values = [value.strip() for value in rest.split(",")]
+            text.append(f"{move} {' '.join(map(''.join, zip('XYZIJK', values, strict=True)))}{feed}\n")
+            move, feed = ("G0" if len(text) == 1 else "G1"), ""
+    text[1] = text[1].replace("G1", "G0")
+    return "".join([*text, "M30\n"])
+
+
 def milling_cell(path: str, *, more: str = "", step_s: float = 0.004) -> str:
     """A cell in which one arm follows a path on a ball that lies still."""
     return f"""\

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders.cam_files import GCODE_HEAD, dome, dome_apt, milling_cell
+from builders.cam_files import GCODE_HEAD, as_gcode, dome, dome_apt, milling_cell
 from builders.commands import run_command
 
 from cellplan import load_cell, solve
@@ -208,21 +208,3 @@ def test_a_dome_of_ten_thousand_points_with_three_feeds_is_solved_in_thirty_seco
     assert solution.passed
     assert len(solution.runs[0].schedule.paths[0].task.path.points) > 10_000
     assert took < 30.0
-
-
-def as_gcode(apt: str) -> str:
-    """The same moves as G-code."""
-    text = [GCODE_HEAD]
-    move, feed = "G1", ""
-    for statement in apt.replace("$\n", "").splitlines():
-        word, _, rest = statement.partition("/")
-        if word == "RAPID":
-            move = "G0"
-        elif word == "FEDRAT":
-            feed = f" F{rest.split(',')[0]}"
-        elif word == "GOTO":
-            values = [value.strip() for value in rest.split(",")]
-            text.append(f"{move} {' '.join(map(''.join, zip('XYZIJK', values, strict=True)))}{feed}\n")
-            move, feed = ("G0" if len(text) == 1 else "G1"), ""
-    text[1] = text[1].replace("G1", "G0")
-    return "".join([*text, "M30\n"])
