@@ -75,6 +75,30 @@ def test_a_curve_that_swings_between_its_points_costs_little_of_the_bound() -> N
     assert moved.smoothed <= 1.02 * moved.bound
 
 
+@pytest.mark.parametrize("inward", [1.0, -1.0])
+def test_depth_on_a_curved_surface_is_that_of_the_tangent_plane(inward: float) -> None:
+    """Points on a cylinder of 20 mm with noise along its axis; the tool works outside on it, or in a bore."""
+    count, size, radius = 60, 0.02, 5e-4
+    angles = np.linspace(0.0, 2.0, count)
+    out = np.stack([np.cos(angles), np.sin(angles), np.zeros(count)], axis=1)
+    points = size * out + np.outer(np.random.default_rng(2).uniform(-4e-4, 4e-4, count), [0.0, 0.0, 1.0])
+    fixed = np.isin(np.arange(count), [0, count - 1])
+    chain = Chain(knots=chord_lengths(points), kinks=fixed & False, fixed=fixed, is_closed=False, is_curved=True)
+
+    moved = chain.with_points(points, -inward * out, radius=radius, into=0.0)
+
+    depths = inward * (size - np.linalg.norm(moved.values[:, :2], axis=1))
+    tangential = np.linalg.norm(np.cross(moved.values - points, out), axis=1)
+    assert moved.smoothed < 0.5 * moved.given
+    assert tangential.max() > 0.5 * radius
+    if inward > 0.0:
+        assert depths.max() <= 1e-9  # the tangent plane is outside of a shaft
+    else:
+        # that of a bore is in the wall by t^2 / 2R at a distance t
+        assert depths.max() <= radius**2 / (2.0 * size) + 1e-9
+        assert np.all(depths <= tangential**2 / (2.0 * size) + 1e-9)
+
+
 @pytest.mark.slow
 def test_ten_thousand_points_reach_their_bound() -> None:
     random, count = np.random.default_rng(1), 10_000
