@@ -378,7 +378,7 @@ def _smooth_remarks(whole: CellDocument, tasks: Sequence[Task]) -> Iterator[tupl
         entry = whole.tasks[task.name].path.smooth
         if entry is not None and isinstance(task.path, SampledPath):
             for key, text in narrow_tubes(task.path, entry, task.tool_axis):
-                yield f"tasks.{task.name}.path.smooth.{key}", f"{task.where(f'path.smooth.{key}')}: {text}"
+                yield f"tasks.{task.name}.path.smooth.{key}", text
 
 
 def _with_source(cell: Cell, source: CellFile) -> Cell:

@@ -92,7 +92,7 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
     )
     if not is_rigid(toolpath.spread(PROBES)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")
-    return replace(toolpath, listed=_as_listed(task, toolpath, _Drawn(held.reruns, curve.curve, woven)))
+    return replace(toolpath, listed=_as_listed(task, toolpath, _Construction(held.reruns, curve.curve, woven)))
 
 
 def _outline(task: Task) -> PathCurve:
@@ -111,15 +111,15 @@ class _HeldTool(NamedTuple):
     reruns: Reruns
 
 
-class _Drawn(NamedTuple):
-    """How a path became a toolpath: what its curve by the file has alike."""
+class _Construction(NamedTuple):
+    """How a path became a toolpath."""
 
     reruns: Reruns
     line: Curve  # with its runs
     woven: WovenPath | None
 
 
-def _as_listed(task: Task, toolpath: Toolpath, drawn: _Drawn) -> Toolpath | None:
+def _as_listed(task: Task, toolpath: Toolpath, how: _Construction) -> Toolpath | None:
     """A smoothed path by the points of its file, at the same parameters; None for another one.
 
     Its weave has the offsets from the smoothed line, so that the tips are as far apart as the lines are.
@@ -127,14 +127,14 @@ def _as_listed(task: Task, toolpath: Toolpath, drawn: _Drawn) -> Toolpath | None
     if not isinstance(task.path, SampledPath) or task.path.smoothing is None:
         return None
     by_file = replace(task, path=task.path.listed)
-    curve, orientation, _ = _with_tool(by_file, _outline(by_file), drawn.reruns)
+    curve, orientation, _ = _with_tool(by_file, _outline(by_file), how.reruns)
     tip: Curve = curve.curve
-    if isinstance(drawn.line, ExtendedCurve):
-        extension = drawn.line.extension
+    if isinstance(how.line, ExtendedCurve):
+        extension = how.line.extension
         orientation = ExtendedFrame(frame=orientation, curve=tip, extension=extension)
         tip = ExtendedCurve(curve=tip, extension=extension)
-    if drawn.woven is not None:
-        tip, orientation = drawn.woven.about(tip, orientation)
+    if how.woven is not None:
+        tip, orientation = how.woven.about(tip, orientation)
     return replace(toolpath, tip=tip, orientation=orientation)
 
 

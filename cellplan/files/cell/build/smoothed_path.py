@@ -70,7 +70,10 @@ def narrow_tubes(path: SampledPath, entry: SmoothEntry, axis: Array | None) -> I
         cure = f"one of {wider:g} {unit} leaves {100.0 * with_wider:.0f} %" + (
             "; leave it out" if with_wider > WORTH else ""
         )
-        yield key, f"gains nothing, {100.0 * left:.1f} % of the roughness of {path.source} is left; {cure}"
+        text = (
+            f"a tube of {tube:g} {unit} gains nothing: {100.0 * left:.1f} % of the roughness of {path.source} is left"
+        )
+        yield key, f"{text}; {cure}"
 
 
 def _share(path: SampledPath, field: str) -> float | None:

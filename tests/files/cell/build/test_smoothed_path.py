@@ -155,20 +155,21 @@ def test_a_cell_has_what_smoothing_leaves_as_its_tolerance_and_is_written_as_it_
         ("csv: p.csv, smooth: {position_mm: 0.2, direction_deg: 2}", None),
         (
             "csv: p.csv, smooth: {position_mm: 0.001}",
-            r"position_mm: gains nothing, 9\d.\d % of .* is left; one of 0.\d+ mm",
+            r"0.001 mm gains nothing: 9\d.\d % .*; one of 0.\d+ mm leaves 7\d %",
         ),
+        ("csv: p.csv, smooth: {direction_deg: 0.01}", r"0.01 deg gains nothing: .*; one of [\d.]+ deg leaves [67]\d %"),
         (
-            "csv: p.csv, smooth: {direction_deg: 0.01}",
-            r"direction_deg: gains nothing, .*; one of [\d.]+ deg leaves [67]\d %",
+            "csv: arc.csv, smooth: {position_mm: 0.001}",
+            r"0.001 mm .* of arc.csv is left; .* leaves 9\d %; leave it out",
         ),
-        ("csv: arc.csv, smooth: {position_mm: 0.001}", r"position_mm: .* of arc.csv is left; .* 9\d %; leave it out"),
     ],
 )
 def test_a_tube_that_gains_nothing_is_located_with_one_that_does(load: Load, words: str, remark: str | None) -> None:
-    remarks = [text for _, text in load(with_path(words)).remarks]
+    remarks = load(with_path(words)).remarks
 
     assert len(remarks) == (remark is not None)
-    assert all(re.match(rf"c:19: tasks\.ring\.path\.smooth\.{remark}", text) for text in remarks)
+    assert all(re.fullmatch(rf"a tube of {remark}", text) for _, text in remarks)
+    assert all(f"{key.rpartition('.')[2]}:" in words for key, _ in remarks)
 
 
 SMOOTH = "c:19: tasks.ring.path.smooth"
