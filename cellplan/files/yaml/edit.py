@@ -47,12 +47,14 @@ def changed_text(text: str, values: Mapping[str, Any], *, head: str) -> str:
     return top + yaml_text(values)
 
 
-def edited_text(text: str, values: Mapping[KeyPath, object]) -> str:
-    """The text with other values; what was in the place of each is repeated in a comment at the end of its line.
+def edited_text(text: str, values: Mapping[KeyPath, object], *, is_remarked: bool = True) -> str:
+    """The text with other values.
 
     Args:
         values: New values by key path; ``REMOVED`` for keys that are removed. The mapping that a new key belongs to
             exists.
+        is_remarked: Whether comments at the end of lines repeat what was in the place of each value, and say which
+            keys are new.
     """
     nodes = _nodes(text)
     edits: list[Edit] = []
@@ -66,8 +68,9 @@ def edited_text(text: str, values: Mapping[KeyPath, object]) -> str:
             edits.append((begin, end, 0, f": {flow_text(value)}" if node.is_block else flow_text(value)))
             remarks.setdefault(_line_end(text, end), []).append(f"{_last_key(path)}: {_shown(text[slice(*node.span)])}")
         else:
-            edits.append(_insertion(text, nodes, path, value))
-    edits += [(end, end, 1, _comment(text, end, notes)) for end, notes in remarks.items()]
+            edits.append(_insertion(text, nodes, path, f"{path[-1]}: {flow_text(value)}", "  # new" * is_remarked))
+    if is_remarked:
+        edits += [(end, end, 1, _comment(text, end, notes)) for end, notes in remarks.items()]
     for begin, end, _, new in sorted(edits, key=lambda edit: edit[:3])[::-1]:  # of equal ones the first comes first
         text = text[:begin] + new + text[end:]
     return text
@@ -107,17 +110,16 @@ def _ends(event: object) -> bool:
     return isinstance(event, yaml.CollectionEndEvent)
 
 
-def _insertion(text: str, nodes: Mapping[KeyPath, _Node], path: KeyPath, value: object) -> Edit:
-    """The edit that adds a key to a mapping, after its last one."""
+def _insertion(text: str, nodes: Mapping[KeyPath, _Node], path: KeyPath, entry: str, remark: str) -> Edit:
+    """The edit that adds an entry to a mapping, after its last one; a remark ends a line of its own."""
     above = nodes[path[:-1]]
-    entry = f"{path[-1]}: {flow_text(value)}"
     if not above.is_block:
         at = nodes[above.children[-1]].span[1] if above.children else above.span[1] - 1
         return at, at, 0, f", {entry}" if above.children else entry
     first = nodes[above.children[0]].key[0]
     column = first - (text.rfind("\n", 0, first) + 1)
     at = _line_end(text, above.span[1])
-    return at, at, LATE - len(path), f"\n{' ' * column}{entry}  # new"
+    return at, at, LATE - len(path), f"\n{' ' * column}{entry}{remark}"
 
 
 def _removal(text: str, nodes: Mapping[KeyPath, _Node], path: KeyPath) -> Iterator[Edit]:
@@ -137,7 +139,8 @@ def _removal(text: str, nodes: Mapping[KeyPath, _Node], path: KeyPath) -> Iterat
 
 def _line_end(text: str, index: int) -> int:
     end = text.find("\n", index)
-    return len(text) if end < 0 else end
+    end = len(text) if end < 0 else end
+    return end - 1 if text[index:end].endswith("\r") else end
 
 
 def _comment(text: str, end: int, notes: list[str]) -> str:
