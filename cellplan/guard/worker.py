@@ -41,8 +41,8 @@ def serve() -> None:
     Output of libraries is discarded: the pipe carries answers only. Ctrl-C is handled by the parent.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    _set_limit("RLIMIT_CORE", 0)  # a crash leaves no file behind
+    threading.Thread(target=end_with_parent, daemon=True).start()
+    limit("RLIMIT_CORE", 0)  # a crash leaves no file behind
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
@@ -61,7 +61,7 @@ def import_modules(*names: str) -> None:
         import_module(name)
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
     """End this process, in the middle of a job too, when the parent has ended and its end of the pipe is closed."""
     with contextlib.suppress(AttributeError, OSError, ValueError):  # Windows cannot wait for it
         pipe = select.poll()
@@ -74,8 +74,8 @@ def _done(job: WorkerJob) -> Answer:
     try:
         if job.folder is not None:
             os.chdir(job.folder)
-        _set_limit("RLIMIT_AS", job.megabytes * MEGABYTE)
-        _set_limit("RLIMIT_CPU", int(sum(os.times()[:2]) + job.seconds) + 1)
+        limit("RLIMIT_AS", job.megabytes * MEGABYTE)
+        limit("RLIMIT_CPU", int(sum(os.times()[:2]) + job.seconds) + 1)
         return Answer(value=job.function(*job.arguments))
     except CellplanError as error:
         return Answer(error=error)
@@ -85,7 +85,7 @@ def _done(job: WorkerJob) -> Answer:
         return Answer(surprise=f"{type(error).__name__}: {error}")
 
 
-def _set_limit(name: str, amount: int) -> None:
+def limit(name: str, amount: int) -> None:
     """Set a soft limit where the system knows it and allows it; Windows knows none, macOS no limit on memory."""
     with contextlib.suppress(ImportError, AttributeError, ValueError, OSError):
         import resource

@@ -30,13 +30,17 @@ def read_record(folder: Path) -> Record:
 
 def summary_lines(record: Record, folder: Path) -> list[str]:
     """All lines about one run folder."""
+    return [*verdict_lines(record), *_place_lines(folder)]
+
+
+def verdict_lines(record: Record) -> list[str]:
+    """What the checks say of a run: verdict, failed checks, worst figures, what was not judged."""
     return [
         f"{record['cell']}: {record['status']}",
         f"  {count_text(record['checks'])}; {motion_text(record)}",
         *failure_lines(record["checks"], "the report"),
         *figure_lines(record, "the report"),
         *(f"  {line}" for line in record.get("not_in_program", [])),
-        *_place_lines(folder),
     ]
 
 
