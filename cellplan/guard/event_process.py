@@ -66,6 +66,11 @@ class EventProcess:
         """Whether the process runs."""
         return self._process.poll() is None
 
+    @property
+    def number(self) -> int:
+        """Its number in the system."""
+        return self._process.pid
+
     def begin(self, function: Callable[..., None], *arguments: object) -> None:
         """Have ``function(*arguments, send=...)`` done after what was begun before; ``send`` makes events of values."""
         if not self.left:

@@ -43,6 +43,7 @@ class Document:
 
     Attributes:
         path: The file.
+        allow_dirs: Further folders that the files it names may lie in.
         changes: The values that were changed since it was read, beside the settings, and the steps to undo and redo.
     """
 
@@ -57,7 +58,7 @@ class Document:
         Raises:
             InputError: The cell cannot be read, or a setting is not valid.
         """
-        self.path, self._allow_dirs, self._settings = path, tuple(allow_dirs), read_settings(settings)
+        self.path, self.allow_dirs, self._settings = path, tuple(allow_dirs), read_settings(settings)
         self._read = self._read_file(self._settings)
         self._theirs: _Read | None = None  # the file as another program has saved it, until the user decides
         self._files, self._last_look = WatchedFiles(path), time.monotonic()
@@ -174,7 +175,7 @@ class Document:
         """The content of the file and the cell that was read from the same content."""
         for _ in range(READS):
             data = _content(self.path)
-            cell = load_cell(self.path, allow_dirs=self._allow_dirs)
+            cell = load_cell(self.path, allow_dirs=self.allow_dirs)
             if cell.inputs[self.path.name] == digest(data):
                 return _Read(data, cell.with_values(settings) if settings else cell)
         raise InputError(f"{self.path}: is saved again and again while it is read")

@@ -8,6 +8,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.session.works.events import Send, progress_event
 
 KINDS: Final = ("certify", "improve", "repair", "map")
+REUSED: Final = frozenset({"certify", "map"})  # layout searches leave the cell in their process that they have read
 MOST_IDLE: Final = 2  # [-] processes that stay warm without work
 
 Record = dict[str, Any]
@@ -25,9 +26,9 @@ class Works:
         self._warm_up(cell)
 
     @property
-    def running(self) -> list[str]:
-        """Kinds of the work under way."""
-        return [*self._busy]
+    def running(self) -> dict[str, int]:
+        """Kinds of the work under way, and the number of the process of each."""
+        return {kind: process.number for kind, process in self._busy.items()}
 
     def start(self, kind: str, *arguments: object) -> None:
         """Begin some work; work of the same kind that is under way is ended.
@@ -75,11 +76,9 @@ class Works:
     def _done(self, kind: str, process: EventProcess) -> None:
         """Take a process back, or end it where enough are warm."""
         del self._busy[kind]
-        if not process.is_usable:
-            self._warm_up()
-        elif len(self._idle) < MOST_IDLE:
-            self._idle.insert(0, process)  # it has seen the cell
-        else:
+        if kind in REUSED and process.is_usable and len(self._idle) < MOST_IDLE:
+            self._idle.insert(0, process)  # its bodies are ready
+        elif process.is_usable:
             process.end()
 
     def _warm_up(self, cell: Cell | None = None) -> None:
