@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 
 from cellplan.errors import CellplanError
 from cellplan.guard.worker import MEGABYTE, end_with_parent, limit
-from cellplan.guard.worker_process import EXIT_TIMEOUT_S, ONE_THREAD
+from cellplan.guard.worker_process import EXIT_TIMEOUT_S, KILL_TIMEOUT_S, ONE_THREAD
 
 # The child starts without its working directory on the path, or a file named pickle.py there would be run.
 PROGRAM: Final = (
@@ -100,7 +100,8 @@ class EventProcess:
     def end(self) -> None:
         """End the process, in the middle of its work if need be."""
         self._process.kill()
-        self._process.wait()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(KILL_TIMEOUT_S)
         for pipe in (self._orders, self._process.stdout, self._events, self._jobs):
             if pipe is not None:
                 pipe.close()
