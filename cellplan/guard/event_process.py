@@ -141,6 +141,6 @@ def _done(job: bytes, send: Send) -> Ended:
         return Ended(str(error))
     except MemoryError:
         return Ended(f"it needed more than {MEGABYTES} MB")
-    except Exception as error:  # noqa: BLE001 - told by the owner
+    except Exception as error:  # noqa: BLE001 - the owner says it
         return Ended(f"{type(error).__name__}: {error}")
     return Ended()

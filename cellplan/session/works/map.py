@@ -64,19 +64,19 @@ def _new_places(ready: PreparedMap, before: float | None) -> Indices:
     return order[~is_old[order]]
 
 
-def _judged(ready: PreparedMap, wanted: Indices) -> Iterator[tuple[float, list[dict[str, Any]]]]:
+def _judged(ready: PreparedMap, sought: Indices) -> Iterator[tuple[float, list[dict[str, Any]]]]:
     """Tiles of some places in their order, and the fraction of them that is done."""
     jobs, tiles = ready.jobs, Tiles.of(ready.jobs, ready.starts())
     phases = [values["phases"] for values in tiles.values]
     starts = [_joined([phase[index] for phase in phases]) for index in range(len(jobs))]
-    for begin in range(0, len(wanted), AT_ONCE):
-        places = wanted[begin : begin + AT_ONCE]
+    for begin in range(0, len(sought), AT_ONCE):
+        places = sought[begin : begin + AT_ONCE]
         verdicts = {place: tiles.known[place] for place in places.tolist()}
         some = [(q[rows], at[rows]) for q, at in starts for rows in [np.isin(at, places)]]
         if len(some[0][1]):
             for place, verdict in judge_phases(jobs, some).items():
                 verdicts[place] = verdict.or_better(tiles.at_start[verdict.phase][place])
-        yield (begin + len(places)) / len(wanted), [_tile(ready, place, verdicts[place]) for place in verdicts]
+        yield (begin + len(places)) / len(sought), [_tile(ready, place, verdicts[place]) for place in verdicts]
 
 
 def _joined(parts: list[dict[str, Any]]) -> tuple[Array, Indices]:
