@@ -235,7 +235,7 @@ def test_events_show_progress_trials_tiles_and_the_question_of_a_conflict(page: 
         session.events.put(event)
     page.run("while (byId('file').hidden) await drawn();")
     seen = page.run("""
-      const before = [byId("progress-text").textContent, app.overlay.tileBodies().length, document.activeElement.id];
+      const before = [byId("progress").textContent.trim(), app.overlay.tileBodies().length, document.activeElement.id];
       byId("outcome").querySelector("button").click();
       byId("file-keep").click();
       return before;

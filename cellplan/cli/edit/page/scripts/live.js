@@ -130,7 +130,7 @@ class LiveApp extends App {
   act(action, argument) {
     const working = Object.values(KEY_ACTIONS).includes(action);
     if (working) {
-      this.outcome.clear();
+      if (action !== "map") this.outcome.clear();
       this.outcome.progress({ work: action, fraction: 0, text: "begins" });
     }
     if (action === "stop") this.outcome.done();
@@ -138,10 +138,11 @@ class LiveApp extends App {
     return this.client.act(action, action === "map" ? this.mapped() : argument);
   }
 
-  /** Number of the robot whose base is mapped: the selected one, else the first with a task. */
+  /** Number of the robot whose base is mapped: the selected one if it has a task, else the first that has one. */
   mapped() {
     const { selected } = this.handles;
-    return selected?.prefix === "base" ? selected.index : this.stage.scene.tasks[0].robot;
+    const operators = this.stage.scene.tasks.map((task) => task.robot);
+    return selected?.prefix === "base" && operators.includes(selected.index) ? selected.index : operators[0];
   }
 
   /** The session has ended: say so, and leave what was changed to be copied. */

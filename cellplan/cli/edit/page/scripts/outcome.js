@@ -11,6 +11,7 @@ const FILE_TEXTS = {
 class Outcome {
   constructor(app) {
     this.app = app;
+    this.rows = new Map(); // of progress, by work
   }
 
   take(event) {
@@ -25,37 +26,54 @@ class Outcome {
         byId("outcome-panel").hidden = false;
       },
       file: () => this.file(event),
-      failed: () => this.say(`${event.work} failed: ${event.text}`, "mark"),
+      failed: () => {
+        this.done(event.work);
+        this.say(`${event.work} failed: ${event.text}`, "mark");
+      },
       end: () => this.app.leave(event.text || "the session has ended"),
     };
     receivers[event.event]?.();
     this.app.refresh();
   }
 
+  /** A row for each work under way. */
   progress({ work, fraction, text }) {
-    const isDone = fraction >= 1;
-    byId("progress").hidden = isDone;
-    byId("stop").disabled = isDone;
-    byId("progress-bar").value = fraction;
-    byId("progress-text").textContent = `${work}: ${text}`;
-    if (isDone && text) this.say(`${work}: ${text}`);
+    if (fraction >= 1) {
+      this.done(work);
+      if (work === "improve" && text !== "done") this.say(`${work}: ${text}`);
+      return;
+    }
+    if (!this.rows.has(work)) {
+      const [bar, words] = [element("progress", { max: 1, attributes: { "aria-label": work } }), element("span", {})];
+      this.rows.set(work, { bar, words, row: element("div", {}, bar, " ", words) });
+      byId("progress").append(this.rows.get(work).row);
+      byId("outcome-panel").hidden = false;
+    }
+    const { bar, words } = this.rows.get(work);
+    bar.value = fraction;
+    words.textContent = `${work}: ${text}`;
+    byId("stop").disabled = false;
   }
 
-  /** Work has ended. */
-  done() {
-    byId("progress").hidden = true;
-    byId("stop").disabled = true;
+  /** Work has ended; without a name all of it. */
+  done(work = null) {
+    for (const [name, { row }] of [...this.rows]) {
+      if (work !== null && name !== work) continue;
+      row.remove();
+      this.rows.delete(name);
+    }
+    byId("stop").disabled = this.rows.size === 0;
   }
 
   verdict({ passed, lines }) {
-    this.done();
+    this.done("certify");
     this.clear();
     this.say(passed ? "certified: all checks of solve passed" : "not certified: checks of solve failed", passed ? "good" : "mark");
     lines.forEach((line) => this.say(line));
   }
 
   remedies(remedies) {
-    this.done();
+    this.done("repair");
     this.clear();
     if (!remedies.length) this.say("no remedy was found");
     for (const remedy of remedies) this.offer(`${remedy.title}: ${remedy.text}`, remedy);

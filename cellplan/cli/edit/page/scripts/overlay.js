@@ -20,9 +20,11 @@ class Overlay {
   /** Prepare for another cell: a square for the tiles. */
   setScene() {
     const { stage, view } = this.app;
-    this.square = stage.geometries.push(gridded(boxSurface([1, 1, 1]))) - 1;
+    const corners = [[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]];
+    this.square = stage.geometries.push(gridded({ points: corners, triangles: [0, 1, 2, 0, 2, 3] })) - 1;
     view.replace(this.square, stage.geometries[this.square]);
     this.tiles.clear();
+    this.rectangles = [];
     byId("legend").replaceChildren();
     this.ghost = null;
   }
@@ -37,6 +39,7 @@ class Overlay {
     if (event.robot !== this.tilesOf) this.tiles.clear();
     this.tilesOf = event.robot;
     for (const tile of event.tiles) this.tiles.set(`${tile.x_mm},${tile.y_mm}`, { ...tile, size: event.size_mm });
+    this.rectangles = [...joinedTiles([...this.tiles.values()])];
     const states = Object.keys(TILE_COLOURS).filter((state) => [...this.tiles.values()].some((tile) => tile.state === state));
     byId("legend").replaceChildren(`base of ${event.robot}: `, ...states.map((state) => (
       element("span", {}, element("span", { className: "swatch", style: `background:${TILE_COLOURS[state]}` }), `${TILE_TEXTS[state]} `)
@@ -112,13 +115,13 @@ class Overlay {
   /** Squares on the floor, finer ones above coarser ones. */
   tileBodies() {
     const floor = this.app.stage.grids.length ? Math.min(...this.app.stage.grids.map((grid) => grid[14])) : 0;
-    return [...this.tiles.values()].map((tile) => {
-      const size = tile.size / 1000;
-      const height = floor + 0.001 + 0.002 / (1 + 10 * size);
+    return this.rectangles.map((tile) => {
+      const height = floor + 0.002 + 0.004 / (1 + 0.01 * tile.size);
       const text = TILE_COLOURS[tile.state] ?? TILE_COLOURS.not_judged;
       const colour = [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16) / 255);
-      const place = multiply(translation([tile.x_mm / 1000, tile.y_mm / 1000, height]), scaling([0.96 * size, 0.96 * size, 1e-4]));
-      return { geometry: this.square, place: multiply(place, translation([-0.5, -0.5, 0])), colour: isDark() ? times(colour, 0.6) : colour };
+      const place = multiply(translation([tile.x_mm / 1000, tile.y_mm / 1000, height]), scaling([tile.width / 1000, tile.size / 1000, 1]));
+      const whole = multiply(place, this.app.stage.geometries[this.square].place);
+      return { geometry: this.square, place: whole, colour: isDark() ? times(colour, 0.6) : colour };
     });
   }
 
@@ -136,6 +139,25 @@ class Overlay {
       return [{ geometry: body.geometry, place, colour: FIXED_COLOUR, opacity: GHOST_OPACITY }];
     });
   }
+}
+
+/** Tiles of one size and state that are neighbours in a row, as one: their middle and width in mm. */
+function* joinedTiles(tiles) {
+  const key = (tile) => [tile.size, tile.y_mm, tile.state].join();
+  let row = null;
+  for (const tile of tiles.sort((a, b) => b.size - a.size || a.y_mm - b.y_mm || a.x_mm - b.x_mm)) {
+    if (row && key(row) === key(tile) && Math.abs(tile.x_mm - row.end - tile.size) < 1e-3) {
+      row.end = tile.x_mm;
+      continue;
+    }
+    if (row) yield joined(row);
+    row = { ...tile, begin: tile.x_mm, end: tile.x_mm };
+  }
+  if (row) yield joined(row);
+}
+
+function joined({ begin, end, ...tile }) {
+  return { ...tile, x_mm: (begin + end) / 2, width: end - begin + tile.size };
 }
 
 /** A line over everything else, made anew for each picture. */
