@@ -27,6 +27,7 @@ WITH_BASE: Final = (
 BASE_TOO: Final = "base, start and weights free"
 LAST: Final = {
     "base and start as given": ("549", "999"),
+    "weights and path free, base and start as given": ("967", "2299"),
     "start and weights free": ("941", "2934"),
     BASE_TOO: ("943", "3036"),
 }  # [mm/s]
@@ -80,7 +81,11 @@ def measured(file: Path, length: int) -> dict[str, str]:
     )
     (run,) = solve(with_overrides(load_cell(file), settings)).runs
     feeds = {"base and start as given": f"{1e3 * run.report.greatest_feeds[0].feed:.0f}"}
-    searched = (("start and weights free", {"free": ("start", "weights")}), (BASE_TOO, {"vary": WITH_BASE}))
+    searched = (
+        ("weights and path free, base and start as given", {"free": ("weights", "path")}),
+        ("start and weights free", {"free": ("start", "weights")}),
+        (BASE_TOO, {"vary": WITH_BASE}),
+    )
     for name, words in searched:
         request = LayoutRequest(cell=file, settings=settings, margin=1.0, **words)  # type: ignore[arg-type]
         with tempfile.TemporaryDirectory() as folder:

@@ -16,7 +16,7 @@ from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.solver import Collocation, NullSpaceMotion, Precision, repeated
 from cellplan.planning.collocation.start_offset import settled, settling_joints
 from cellplan.planning.collocation.windows import Window, windows_between
-from cellplan.planning.tracking.given_path import GivenPath
+from cellplan.planning.tracking.given_path import GivenPath, GivenVelocities
 from cellplan.planning.tracking.motion_task import closures
 
 AT_ONCE: Final = 32  # candidates that are resolved together: enough for NumPy, and their arrays stay in the cache
@@ -160,8 +160,9 @@ class _Screen:
         breaks, jumps = schedule.breaks, schedule.jumps
         self._at_start = self._desired_at(breaks[:1], breaks[:1], breaks[1:2])
         self._given = GivenPath.of(cell, schedule, moving)
-        if self._given is not None:
-            jumps = distinct(np.concatenate([jumps, self._given.knots]))
+        self._velocities = GivenVelocities.of(cell, float(schedule.times[-1]), moving)
+        if self._velocities is not None:
+            jumps = distinct(np.concatenate([jumps, self._velocities.knots]))
         self._windows = windows_between(jumps, whole=float(breaks[-1]), knots=breaks, highest=FIRST_DEGREE)
         self._settling = settling_joints(cell, [path.task for path in schedule.paths])
         self._limits = cell.joint_limits
@@ -176,7 +177,7 @@ class _Screen:
         q, arrived = settled(self._tasks, desired, placement, start.T, mobile=self._settling, accuracy=self._accuracy)
         screening = Screening.unknown(q.T.copy())
         screening.lost_at[arrived] = 0.0
-        null_space = None if self._given is None else NullSpaceMotion(drift=self._given.velocities)
+        null_space = None if self._velocities is None else NullSpaceMotion(drift=self._velocities.at)
         collocation = Collocation(self._tasks, self._desired_at, placement, self._precision, null_space=null_space)
 
         def record(window: Window, cells: Indices, nodes: Array, errors: Array) -> None:

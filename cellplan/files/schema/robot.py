@@ -284,6 +284,11 @@ class RobotEntry(Entry):
         "Path of its joints over the common clock, for the first holder of the part only, in the mode simultaneous; "
         "the other robots then follow their tasks by themselves.",
     )
+    null_space: JointPathEntry | None = setting(
+        None,
+        "Motion of its joints over the common clock of which the tasks leave what moves no tool relative to the part: "
+        "its velocities are projected onto their null space. Only changes of the coefficients count.",
+    )
     weights: tuple[Weight, ...] | None = setting(
         None, "One positive weight per joint, ones when absent; a larger weight moves that joint less."
     )

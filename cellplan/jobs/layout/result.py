@@ -158,10 +158,8 @@ def path_text(path: Record) -> str:
     parts = ((path["departure_deg"], "deg"), (path["departure_mm"], "mm"))
     departures = " and ".join(f"{value:.3g} {unit}" for value, unit in parts if value is not None)
     given = "path" if path["is_given"] else "motion"
-    return (
-        f"{path['robot']}.path: {path['coefficients']} coefficients a joint, largest departure {departures} from the "
-        f"given {given}"
-    )
+    name = f"{path['robot']}.path" if path["robot"] else "null_space"
+    return f"{name}: {path['coefficients']} coefficients a joint, largest departure {departures} from the given {given}"
 
 
 def _choice(variable: Record) -> str:

@@ -32,9 +32,9 @@ class VariableRecord(TypedDict):
 
 
 class PathRecord(TypedDict):
-    """The joint path of the best layout."""
+    """The joint path of the best layout, or its motion in the null space."""
 
-    robot: Annotated[str, "whose joints follow it"]
+    robot: Annotated[str, "whose joints follow it; empty for motion of all robots in the null space of the tasks"]
     coefficients: Annotated[int, "number of coefficients of each joint"]
     degree: Annotated[int, "degree of the spline"]
     is_given: Annotated[bool, "whether the given cell has a path; else the given motion is that without one"]
@@ -75,8 +75,9 @@ def variable_records(
 def path_record(ready: PreparedSearch, x: Array) -> PathRecord:
     """The joint path at variables of shape (n,), beside the given motion."""
     search = ready.path_search
-    model, departures = ready.variables.base.robot(search.settings.robot).model, search.departures(x)
-    turning = np.array([joint.is_revolute for joint in model.joints])
+    departures = search.departures(x)
+    joints = [joint for name in search.robots for joint in ready.variables.base.robot(name).model.joints]
+    turning = np.array([joint.is_revolute for joint in joints])
     in_deg, in_mm = (departures[is_selected].max(initial=-1.0) for is_selected in (turning, ~turning))
     return {
         "robot": search.settings.robot,

@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.layout.trials.prepared import PreparedSearch, values_of
 from cellplan.model.cell.layout import VariableKind
-from cellplan.search.spline_path.problem import PathProblem
+from cellplan.search.spline_path.spline_problem import SplineProblem
 
 LEAST: Final = 1e-3  # [-] cost of a change that is left out: 0.1 mm or 0.01 deg
 LENGTH: Final = 1e-4  # [m] to which lengths are rounded
@@ -24,7 +24,7 @@ def neat(ready: PreparedSearch, x: Array, start: Array) -> tuple[Array, Array]:
         start: Start posture in [rad] or [m], shape (nq,).
     """
     variables = ready.variables
-    if isinstance(ready.coarse, PathProblem):  # every coefficient changes, none is one that anyone would type
+    if isinstance(ready.coarse, SplineProblem):  # every coefficient changes, none is one that anyone would type
         return x, start
     kinds = {variable.address: variable for variable in variables.settings.ranges}
     rounded = x.copy()

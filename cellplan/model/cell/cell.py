@@ -74,6 +74,7 @@ class Robot:
         gripper: Names of link bodies of its model that make up a gripper, which may work on the part as a tool does.
         order: Names of its tasks and marks in the order of work; empty for the order of the cell's tasks.
         path: Its joints over the whole clock; None where they follow from the tasks.
+        null_space: Joint motion over the whole clock, projected onto the null space of the tasks; None for none.
         control: Where it is connected; None when no controller is stated.
         service: How its tool is cleaned; None when it is not.
         joint_sums: Ranges of sums of its joint angles.
@@ -94,6 +95,7 @@ class Robot:
     gripper: tuple[str, ...] = ()
     order: tuple[str, ...] = ()
     path: JointSpline | None = None
+    null_space: JointSpline | None = None
     control: RobotControlEntry | None = None
     service: Service | None = None
     joint_sums: tuple[JointSum, ...] = ()

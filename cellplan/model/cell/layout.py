@@ -48,9 +48,9 @@ class VaryRange:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathRange:
-    """The joint path of a positioner, as a spline that may change."""
+    """The joint path of a positioner, or motion of all robots in the null space, as splines that may change."""
 
-    robot: str  # name of the positioner
+    robot: str  # name of the positioner; empty for the null space
     coefficients: int = 14  # coefficients of each joint
     degree: int = 5  # degree of the spline, 3 or 5
 
@@ -89,6 +89,7 @@ class LayoutSettings:
 
     ranges: tuple[VaryRange, ...]  # numbers that may change
     paths: tuple[PathRange, ...] = ()  # joint paths of positioners that may change
+    null_space: PathRange | None = None  # motion in the null space that may change
     choices: tuple[LayoutChoice, ...] = ()  # discrete choices
     equal: tuple[tuple[str, ...], ...] = ()  # addresses of ranges that have one value
     mirrored: tuple[Mirrored, ...] = ()  # pairs of bases that are placed symmetrically

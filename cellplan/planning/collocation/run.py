@@ -26,7 +26,7 @@ from cellplan.planning.collocation.solver import (
 from cellplan.planning.collocation.start_offset import start_offset
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
 from cellplan.planning.euler.cycle_closing import SAME_POSE, drift_pace
-from cellplan.planning.tracking.given_path import GivenPath
+from cellplan.planning.tracking.given_path import GivenVelocities
 from cellplan.planning.tracking.motion_task import MotionTask, locked_since
 from cellplan.scene.kinematics.batched import CACHE_BLOCK
 
@@ -69,7 +69,7 @@ class AccurateRun:
         self._tasks, self._placement, self._grasps, self._offset = tasks, placement, grasps, offset
         self._on_paths, self._desired_at = on_paths, desired_motion(schedule.paths, grasps, offset)
         self._locked_since, self._progress = locked_since(cell), progress
-        self._given = GivenPath.of(cell, schedule, motion.moving)
+        self._given = GivenVelocities.of(cell, self.end, motion.moving)
         knots = np.zeros(0) if self._given is None else self._given.knots
         self._redundancy = redundancy(motion, tasks)
         switched = np.zeros(0) if self._redundancy is None else self._redundancy.breaks
@@ -98,7 +98,7 @@ class AccurateRun:
 
         paced = None if drift is None else _paced(drift, begin, end)
         if self._given is not None:
-            paced = self._given.velocities
+            paced = self._given.at
         at = q[:, None].copy()
         for breaks in self._stretches(begin, end):
             mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)

@@ -1,4 +1,4 @@
-"""Given path: the motion of a positioner that the cell states, on the clock of a schedule."""
+"""Given path: joint motion that the cell states, of its positioner or in the null space, on the clock of a schedule."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,6 @@ class GivenPath:
     """The joints of one robot over time, which the other robots only follow."""
 
     columns: slice  # place of its joints in the stacked joint vector
-    joint_count: int  # length of that vector
     spline: JointSpline  # the joints over the share of the clock
     end: float  # nominal time in [s] at which the clock ends
 
@@ -32,23 +31,48 @@ class GivenPath:
         for robot in cell.robots:
             if robot.path is not None and robot.name in moving:
                 columns = cell.columns(robot.name)
-                return cls(columns=columns, joint_count=cell.joint_count, spline=robot.path, end=end)
+                return cls(columns=columns, spline=robot.path, end=end)
         return None
-
-    @property
-    def knots(self) -> Array:
-        """Nominal times in [s] at which two polynomials meet, shape (K,)."""
-        return self.spline.knots * self.end
 
     def at(self, sigma: Array, derivative: int = 0) -> Array:
         """Its joints, or their derivatives by the nominal time, at nominal times in [s] of shape (N,), (N, n)."""
         shares = np.clip(np.asarray(sigma) / self.end, 0.0, 1.0)
         return self.spline.at(shares, derivative) / self.end**derivative
 
-    def velocities(self, sigma: Array) -> Array:
-        """Velocities of all joints of the cell, those of the others zero, shape (nq, N)."""
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GivenVelocities:
+    r"""Joint velocities ``u`` that a cell states, of a given path and in the null space of the tasks.
+
+    .. math:: \dot q = J^\# \dot x_d + (I - J^\# J) \, u
+
+    The joints of a given path take no part in ``J``, so that they have them as they are.
+    """
+
+    splines: tuple[GivenPath, ...]  # those of the robots that move, at least one
+    joint_count: int  # length of the stacked joint vector
+
+    @classmethod
+    def of(cls, cell: Cell, end: float, moving: Sequence[str]) -> "GivenVelocities | None":
+        """Those on a clock that ends at a nominal time in [s]; None where nothing is stated of robots that move."""
+        splines = [
+            GivenPath(columns=cell.columns(robot.name), spline=spline, end=end)
+            for robot in cell.robots
+            for spline in (robot.path, robot.null_space)
+            if spline is not None and robot.name in moving
+        ]
+        return cls(splines=tuple(splines), joint_count=cell.joint_count) if splines else None
+
+    @property
+    def knots(self) -> Array:
+        """Nominal times in [s] at which two polynomials meet, shape (K,)."""
+        return np.concatenate([given.spline.knots * given.end for given in self.splines])
+
+    def at(self, sigma: Array) -> Array:
+        """Velocities of all joints of the cell at nominal times in [s] of shape (N,), shape (nq, N)."""
         velocities = np.zeros((self.joint_count, len(sigma)))
-        velocities[self.columns] = self.at(sigma, 1).T
+        for given in self.splines:
+            velocities[given.columns] += given.at(sigma, 1).T
         return velocities
 
 

@@ -12,7 +12,7 @@ from cellplan.errors import DivergedError
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.cell.cell import Cell, Grasp, Relation
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
-from cellplan.planning.tracking.given_path import GivenRows
+from cellplan.planning.tracking.given_path import GivenRows, GivenVelocities
 from cellplan.planning.tracking.joint_weights import JointWeights
 from cellplan.planning.tracking.motion_task import MotionTask, locked_since
 from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, rests_of, share_within
@@ -74,7 +74,7 @@ class TrackingProblem:
         damping: Largest damping factor; None leaves it to the method.
         given: Joints whose motion the cell gives, at the samples.
         drift: Joint velocities that are added at sample k and configuration q besides the tasks, shape (nq,): what
-            closes a cycle.
+            closes a cycle, or what the cell states.
     """
 
     def __init__(self, motion: MotionTask, drift: Drift | None = None, references: Array | None = None) -> None:
@@ -103,7 +103,7 @@ class TrackingProblem:
         self._given_signs = every * self.constraints.follows_path
         self.gain = cell.solver.gain
         self.damping = None if cell.solver.damping == "auto" else cell.solver.damping
-        self.motion, self.drift = motion, drift
+        self.motion, self.drift = motion, drift or _stated_drift(motion)
         self._last: tuple[Array, CellState] | None = None
         goals = partial(SecondaryGoals, cell, self._model, tasks=self.tasks, start=motion.start)
         self._goals = goals(rests=rests_of(cell, schedule)) if cell.solver.secondary.goals else None
@@ -180,7 +180,7 @@ class TrackingProblem:
         return other
 
     def _drift(self, k: int, q: Array) -> Array | None:
-        """Joint velocities that are added to close a cycle, of those joints that may move."""
+        """Joint velocities that are added, of those joints that may move for the tasks."""
         return None if self.drift is None else self.drift(k, q) * self.mobile(k)
 
     def _with_goals(self, k: int, q: Array, state: CellState, first: FirstOrder, *, signs: Array) -> FirstOrder:
@@ -217,6 +217,17 @@ class TrackingProblem:
             f"the tool of '{task.robot}' is {1e3 * distances[worst]:.0f} mm from {_place(task)}: "
             "the path cannot be followed from this start posture"
         )
+
+
+def _stated_drift(motion: MotionTask) -> Drift | None:
+    """Joint velocities at the samples that the cell states; None where it states none."""
+    schedule = motion.schedule
+    sigma = schedule.times if schedule.clock is None else schedule.clock.sigma
+    stated = GivenVelocities.of(motion.cell, float(sigma[-1]), motion.moving)
+    if stated is None:
+        return None
+    velocities = (stated.at(sigma) * np.gradient(sigma, schedule.times)).T
+    return lambda k, _: velocities[k]
 
 
 def _place(task: Relation) -> str:

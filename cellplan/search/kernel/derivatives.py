@@ -1,8 +1,10 @@
 r"""Exact derivatives of a motion by its variational equations.
 
-With :math:`J \dot q = \dot x_d` and :math:`W \dot q = J^T \lambda` a change of joints and layout changes the speeds by
+With :math:`J \dot q = \dot x_d` and :math:`W (\dot q - u) = J^T \lambda`, where ``u`` is added in the null space, a
+change of joints and layout changes the speeds by
 
-.. math:: d\dot q = J^\# \left( -dJ \, \dot q - J k \right) + k, \qquad k = W^{-1} (dJ^T \lambda - dW \, \dot q)
+.. math:: d\dot q = J^\# \left( -dJ \, \dot q - J k \right) + k, \qquad
+          k = W^{-1} \left( dJ^T \lambda - dW \, (\dot q - u) \right) + du
 
 Both :math:`dJ \, \dot q` and :math:`dJ^T \lambda` are sums of Lie brackets of screws, so that no second derivative of
 any pose is needed. Tools stay on their paths: :math:`J \, dq = -(\beta + \tau)` for base (:math:`\beta`) and tool
@@ -94,12 +96,16 @@ class _Rates:
         screws = TaskScrews.of(job, layout, q, directions)
         changes = JacobianChanges.of(job, screws, qd)
         J, self._idle = changes.jacobian, changes.idle
-        self._J, self._weights, self._settling = J[0], weights, job.settling * job.constraints.may_move
+        at_rest = np.concatenate([robot.weights for robot in job.cell.robots])  # by which ``settled`` moves the tools
+        self._J, self._settling = J[0], job.settling * job.constraints.may_move / at_rest
         mobility = job.constraints.may_move / weights
         inverse = self._inverse(J, mobility)
-        forces = np.swapaxes(inverse, 1, 2) @ (weights * qd)[:, :, None]  # the multipliers, as W qd = J^T lambda
+        own = qd if job.drift is None else qd - job.constraints.may_move * job.drift
+        forces = np.swapaxes(inverse, 1, 2) @ (weights * own)[:, :, None]  # multipliers, as W (qd - u) = J^T lambda
         bent = mobility[:, None] * changes.forces(forces[..., 0])
-        bent[:, :, nq:] -= (directions.weights / weights[:, None]) * qd[:, :, None]
+        bent[:, :, nq:] -= (directions.weights / weights[:, None]) * own[:, :, None]
+        if directions.drift is not None:
+            bent[:, :, nq:] += job.constraints.may_move[:, None] * directions.drift
         twists = changes.twists()
         twists += J @ bent
         bent -= inverse @ twists
@@ -115,7 +121,7 @@ class _Rates:
 
     def start(self, start: Array) -> Array:
         """Change of the start posture, shape (nq, p), once the tools are back at the starts of their paths."""
-        inverse = self._inverse(self._J[None], self._settling / self._weights)[0]
+        inverse = self._inverse(self._J[None], self._settling)[0]
         return start + inverse @ (self._driven[0] - self._J @ start)
 
     def _inverse(self, J: Array, mobility: Array) -> Array:

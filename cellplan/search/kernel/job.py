@@ -14,6 +14,7 @@ from cellplan.model.robot.robot import JointLimits
 from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.start_offset import settling_joints
+from cellplan.planning.tracking.given_path import GivenVelocities
 from cellplan.planning.tracking.motion_task import closures
 from cellplan.planning.tracking.task_constraints import TaskConstraints
 from cellplan.scene.kinematics.batched import Placement
@@ -46,6 +47,8 @@ class Job:
     steps: Array  # weights in [s] of the rates at a node and the two before in the multistep rule, shape (N - 1, 3)
     rates: Array  # derivatives by time in [1/s] at the nodes, of what is given at them, shape (N, N)
     integral: Array  # integrals in [s] from the first node to each, of what is given at the nodes, shape (N, N)
+    # velocities in [rad/s] or [m/s] that are added in the null space at the nodes, shape (N, nq); None for none
+    drift: Array | None = None
 
     @classmethod
     def of(
@@ -81,6 +84,7 @@ class Job:
         times, begins, ends = nodes
         X, V = desired_motion(schedule.paths, grasps)(times, begins, ends)
         is_begin = np.append(True, np.diff(times) == 0.0)
+        stated = GivenVelocities.of(cell, float(times[-1]), moving)
         return cls(
             cell=cell,
             relations=relations,
@@ -96,6 +100,7 @@ class Job:
             steps=_multistep(times, is_begin),
             rates=_rates(times, is_begin),
             integral=_integral(times, is_begin),
+            drift=None if stated is None else stated.at(times).T,
         )
 
 

@@ -1,9 +1,10 @@
 r"""Run: the motions of many layouts on the nodes of their job, all candidates side by side.
 
-From node to node the joints follow :math:`\dot q = J^\# \dot x_d`, the weighted pseudo-inverse of the cooperation
-Jacobian ([Ribeiro2010]_ Eq. D.28): a multistep rule predicts the next configuration, one step of Newton's method with
-the same inverse brings the tools back to their paths. So every node takes one linearisation of all candidates. This is
-the motion of the accurate mode up to what lies between two nodes; nothing is certified here.
+From node to node the joints follow :math:`\dot q = J^\# \dot x_d + (I - J^\# J) u`, the weighted pseudo-inverse of the
+cooperation Jacobian ([Ribeiro2010]_ Eq. D.28) and what the cell adds in its null space: a multistep rule predicts the
+next configuration, one step of Newton's method with the same inverse brings the tools back to their paths. So every
+node takes one linearisation of all candidates. This is the motion of the accurate mode up to what lies between two
+nodes; nothing is certified here.
 """
 
 from dataclasses import dataclass
@@ -112,7 +113,8 @@ class _March:
             at, self._desired(node), self._placement, mobile=self._mobile, weights=self._weights
         )
         errors = np.abs(linear.errors).max(axis=(0, 1))
-        return at + linear.correction(np.zeros_like(at)), linear.velocities(), errors
+        drift = None if job.drift is None else job.drift[node]
+        return at + linear.correction(np.zeros_like(at)), linear.velocities(drift), errors
 
     def _desired(self, node: int) -> Desired:
         """The desired motion at a node, the same for all."""
@@ -172,7 +174,8 @@ class _Passes:
         linear = self.job.tasks.linearise(
             at.reshape(nq, -1), self.desired, self.placement, mobile=np.ones(nq), weights=self.weights
         )
-        velocities = linear.velocities().reshape(at.shape)
+        drift = None if self.job.drift is None else np.tile(self.job.drift.T, count)
+        velocities = linear.velocities(drift).reshape(at.shape)
         picard = (self.start + velocities @ self.job.integral.T - at).reshape(nq, -1)
         change = picard + linear.correction(picard)
         if self.rates is not None:

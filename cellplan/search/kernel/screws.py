@@ -22,6 +22,7 @@ class Directions:
     tool: Array  # likewise of each tool tip, along the axes of the flange, shape (robots, 6, p)
     start: Array  # change of the start posture, shape (nq, p); joints that bring the tools to their paths follow
     weights: Array  # change of the joint weights, shape (nq, p)
+    drift: Array | None = None  # of the velocities that are added in the null space, shape (N, nq, p); None for none
 
     @property
     def count(self) -> int:

@@ -10,29 +10,19 @@ kernel. What the spline does to the positioner is linear in its coefficients.
 """
 
 from dataclasses import dataclass, field
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array, Indices
-from cellplan.geometry.frozen import derive
-from cellplan.model.cell.cell import joint_at
+from cellplan.geometry.arrays import Array
 from cellplan.scene.kinematics.batched import Placement
-from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.jacobian_changes import JacobianChanges
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions, TaskScrews
-from cellplan.search.kernel.singular_values import SingularValues
-from cellplan.search.kernel.varied import KernelVariables
-from cellplan.search.programs.layout_problem import PairsAtNodes, distances_at
-from cellplan.search.programs.problem import DRAWS, Distances, Point, PointDerivatives, ProblemFields
-from cellplan.search.programs.transfers import Transfers
+from cellplan.search.programs.problem import Point, PointDerivatives
 from cellplan.search.spline_path.nodes import PathNodes
-from cellplan.search.spline_path.variables import PathVariables
+from cellplan.search.spline_path.spline_problem import SplineProblem
 
-WAVES: Final = 4  # cosines along the path, from the constant to one and a half periods
-SHARE: Final = 0.5  # of a usual step, of the constant; of each further wave less
-SMALLER: Final = 0.9  # factor of the next draw where a tool could not follow
 MOST_STEPS: Final = 12  # of Newton's method: four from a motion nearby
 CONVERGED: Final = 1e-10  # [rad] and [m]: a step below this changes nothing any more
 LONGEST: Final = 1.0  # [rad] or [m] of a step: beyond it another solution may be nearer
@@ -40,38 +30,16 @@ TORN: Final = 0.1  # [rad] or [m] by which joints may leave their own speeds fro
 START_STEPS: Final = 30  # of Newton's method to bring the tools to the starts of their paths
 
 
-class WrittenVariables(KernelVariables, Protocol):
-    """Variables of the layout, of which there may be none, that know how the cell file writes them."""
-
-    def values(self, x: Array, start: Array) -> dict[str, object]:
-        """What to write into the cell file, by address."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PathProblem(ProblemFields):
-    """See ``Problem``: the coefficients of the path are the first variables, those of the layout the others."""
+class PathProblem(SplineProblem):
+    """See ``Problem``: operators follow a spline of the positioner."""
 
     nodes: PathNodes  # the job at its nodes
-    path: PathVariables  # the coefficients
-    layout: WrittenVariables  # what else may vary
-    bodies: CellDistances
-    acceleration: Array  # see ``Problem``
     is_dense: bool = field(init=False, default=True)  # its nodes are cheap; wrists near a singularity make peaks narrow
-
-    def __post_init__(self) -> None:
-        """Put the variables one after the other."""
-        job = self.nodes.job
-        derive(self, times=job.times, limits=job.limits)
-        derive(self, transfers=Transfers.none(job.cell.joint_count, nodes=len(job.times)))
-        path, layout = self.path, self.layout
-        given = np.concatenate([path.given.coefficients.ravel(), layout.given])
-        derive(self, names=(*path.names, *layout.names), given=given)
-        for name in ("lower", "upper", "scale", "cost"):
-            derive(self, **{name: np.concatenate([getattr(path, name), getattr(layout, name)])})
 
     def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:
         """See ``Problem``."""
-        spline, others = self._split(x)
+        spline, others = self.split(x)
         coefficients = self.path.spline(spline).coefficients
         placement = self.layout.layouts(others[None], start[None]).placement(self.nodes.job)
         q = continued(self.nodes, placement, coefficients, start) if near is None else near.q
@@ -85,61 +53,20 @@ class PathProblem(ProblemFields):
 
     def derivatives(self, point: Point) -> PointDerivatives:
         """See ``Problem``."""
-        _, others = self._split(point.x)
+        _, others = self.split(point.x)
         return path_derivatives(
             self.nodes,
-            self._layout_at(point),
+            self.layout_at(point),
             point.q,
             point.qd,
             self.layout.directions(others),
             is_accelerating=bool(np.isfinite(self.acceleration).any()),
         )
 
-    def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
-        """See ``Problem``."""
-        return distances_at(self.bodies, self._split(point.x)[1], point.q, nodes, within)
-
-    def distance_derivatives(self, point: Point, distances: Distances, by_joints: PointDerivatives) -> Array:
-        """See ``Problem``."""
-        pairs, count, (_, others) = PairsAtNodes.of(distances), len(self.path.names), self._split(point.x)
-        near, dq = pairs.near, by_joints.q[pairs.nodes]
-        by_path = (near.by_joints[:, None] @ dq[near.samples][..., :count])[:, 0]
-        if not len(others):
-            return by_path
-        return np.concatenate([by_path, self.bodies.derivatives(near, others, dq[..., count:])], axis=1)
-
-    def arms(self, point: Point) -> SingularValues:
-        """See ``Problem``."""
-        _, others = self._split(point.x)
-        return SingularValues.of(
-            self.nodes.job, self._layout_at(point), point.q, lambda: self.layout.directions(others)
-        )
-
-    def pair_names(self, pair: int) -> tuple[str, str]:
-        """See ``Problem``."""
-        return self.bodies.pairs[pair].names
-
-    def joint_names(self, column: int) -> tuple[str, str]:
-        """See ``Problem``."""
-        return joint_at(self.nodes.job.cell, column)
-
     def values(self, x: Array, start: Array) -> dict[str, object]:
         """What to write into the cell file, by address: the path in place of the start posture of its robot."""
-        spline, others = self._split(x)
-        values, robot = self.layout.values(others, start), f"robots.{self.path.robot}"
-        for key in ("start", "start_deg"):
-            values[f"{robot}.{key}"] = None
-        values[f"{robot}.path"] = self.path.written(self.nodes.job.cell, spline)
-        return values
-
-    def _split(self, x: Array) -> tuple[Array, Array]:
-        """The coefficients, and the variables of the layout."""
-        count = len(self.path.names)
-        return x[:count], x[count:]
-
-    def _layout_at(self, point: Point) -> Layouts:
-        """The layout at a point."""
-        return self.layout.layouts(self._split(point.x)[1][None], point.start[None])
+        (robot,) = self.path.robots
+        return SplineProblem.values(self, x, start) | {f"robots.{robot}.{key}": None for key in ("start", "start_deg")}
 
 
 def path_derivatives(
@@ -264,29 +191,3 @@ def _is_one_motion(times: Array, q: Array, qd: Array) -> bool:
     """Whether neighbouring nodes belong together: no joint leaves what its own speeds lead to."""
     step = np.diff(times)[:, None]
     return bool(np.abs(np.diff(q, axis=0) - 0.5 * step * (qd[1:] + qd[:-1])).max(initial=0.0) <= TORN)
-
-
-def perturbed_path(
-    problem: PathProblem, x: Array, start: Array, rng: np.random.Generator, *, size: float
-) -> Point | None:
-    """A random point near a given one, drawn again and smaller until all tools can follow their paths, or None.
-
-    Args:
-        x: The variables, shape (n,).
-        start: Start posture near the right one in [rad] or [m], shape (nq,).
-        size: Standard deviation in usual steps.
-    """
-    origin = problem.evaluate(x, start)
-    if origin is None:
-        return None
-    rows, columns = problem.path.given.coefficients.shape
-    order = np.arange(WAVES)
-    waves = np.cos(np.pi * np.linspace(0.0, 1.0, rows)[:, None] * order) * SHARE / (1.0 + order)
-    for _ in range(DRAWS):
-        path = (waves @ rng.normal(size=(WAVES, columns))).ravel()
-        step = np.concatenate([path, rng.normal(size=len(x) - len(path))])
-        point = problem.evaluate(np.clip(x + size * problem.scale * step, problem.lower, problem.upper), start, origin)
-        if point is not None:
-            return point
-        size *= SMALLER
-    return None

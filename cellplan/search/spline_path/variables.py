@@ -1,7 +1,7 @@
 """Coefficients of a positioner's path as variables of a search, and the path that a search begins with."""
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -24,57 +24,77 @@ FARTHEST: Final = float(np.radians(1080.0))  # [rad] or [m] of a coefficient of 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PathVariables:
-    """The coefficients, one configuration after the other."""
+    """The coefficients, one configuration after the other, each of the joints of some robots."""
 
-    robot: str  # name of the positioner
-    given: JointSpline  # the path that is searched from
+    robots: tuple[str, ...]  # names of the robots: the positioner alone of a path
+    key: str  # their key in the cell file, ``path`` or ``null_space``
+    given: JointSpline  # the spline that is searched from
     names: tuple[str, ...]  # addresses in the cell file, n of them
     lower: Array  # lowest values in [rad] or [m], shape (n,)
     upper: Array  # highest values, shape (n,)
     scale: Array  # A usual step of each, shape (n,)
-    cost: Array  # cost of a change by one unit of each, shape (n,): 1 for a change of the whole path by a usual step
+    cost: Array  # cost of a change by one unit of each, shape (n,): 1 for a change of the whole spline by a usual step
 
     @classmethod
     def of(cls, cell: Cell, robot: str, given: JointSpline) -> "PathVariables":
-        """Those of a robot's path, searched from a given one."""
-        model, rows = cell.robot(robot).model, len(given.coefficients)
-        turning = np.array([joint.is_revolute for joint in model.joints])
-        scale = np.where(turning, USUAL_ANGLE, USUAL_LENGTH)
+        """Those of the path of a positioner, searched from a given one."""
+        model = cell.robot(robot).model
         with np.errstate(invalid="ignore"):
             beyond = np.where(np.isfinite(model.upper - model.lower), BEYOND * (model.upper - model.lower), FARTHEST)
         lower, upper = np.maximum(model.lower, -FARTHEST) - beyond, np.minimum(model.upper, FARTHEST) + beyond
         lower = np.minimum(lower, given.coefficients.min(axis=0))
         upper = np.maximum(upper, given.coefficients.max(axis=0))
-        key = "coefficients_deg" if turning.all() else "coefficients"
-        joints = [
-            f"[{index}]" if turning.all() else f".{joint.name}_{joint_unit(is_revolute=joint.is_revolute).name}"
-            for index, joint in enumerate(model.joints)
-        ]
-        return cls(
-            robot=robot,
-            given=given,
-            names=tuple(f"robots.{robot}.path.{key}[{row}]{joint}" for row in range(rows) for joint in joints),
-            lower=np.tile(lower, rows),
-            upper=np.tile(upper, rows),
-            scale=np.tile(scale, rows),
-            cost=np.tile(1.0 / (scale * rows), rows),
-        )
+        rows = len(given.coefficients)
+        return cls(**_common(cell, (robot,), "path", given), lower=np.tile(lower, rows), upper=np.tile(upper, rows))
+
+    @classmethod
+    def of_null_space(cls, cell: Cell, robots: tuple[str, ...], given: JointSpline) -> "PathVariables":
+        """Those of motion in the null space, of which changes alone count: the first configuration is zero."""
+        most = np.full(given.coefficients.shape, FARTHEST)
+        most[0] = 0.0
+        return cls(**_common(cell, robots, "null_space", given), lower=-most.ravel(), upper=most.ravel())
 
     def spline(self, x: Array) -> JointSpline:
-        """The path at values of the variables, shape (n,)."""
+        """The spline at values of the variables, shape (n,)."""
         return JointSpline(coefficients=x.reshape(self.given.coefficients.shape), degree=self.given.degree)
 
     def written(self, cell: Cell, x: Array) -> dict[str, object]:
-        """The path as the cell file writes it."""
-        units = [joint_unit(is_revolute=joint.is_revolute) for joint in cell.robot(self.robot).model.joints]
-        rows = x.reshape(self.given.coefficients.shape) * np.array([unit.scale for unit in units])
-        values = [[round(float(value), DECIMALS) + 0.0 for value in row] for row in rows]
-        if all(joint.is_revolute for joint in cell.robot(self.robot).model.joints):
-            return {"degree": self.given.degree, "coefficients_deg": values}
-        keys = [
-            f"{joint.name}_{unit.name}" for joint, unit in zip(cell.robot(self.robot).model.joints, units, strict=True)
-        ]
-        return {"degree": self.given.degree, "coefficients": [dict(zip(keys, row, strict=True)) for row in values]}
+        """The splines as the cell file writes them, by address."""
+        coefficients, written = x.reshape(self.given.coefficients.shape), dict[str, object]()
+        for robot in self.robots:
+            joints = cell.robot(robot).model.joints
+            rows, coefficients = coefficients[:, : len(joints)], coefficients[:, len(joints) :]
+            units = [joint_unit(is_revolute=joint.is_revolute) for joint in joints]
+            scaled = rows * np.array([unit.scale for unit in units])
+            values = [[round(float(value), DECIMALS) + 0.0 for value in row] for row in scaled]
+            entry: dict[str, object] = {"degree": self.given.degree, "coefficients_deg": values}
+            if not all(joint.is_revolute for joint in joints):
+                keys = [f"{joint.name}_{unit.name}" for joint, unit in zip(joints, units, strict=True)]
+                del entry["coefficients_deg"]
+                entry["coefficients"] = [dict(zip(keys, row, strict=True)) for row in values]
+            written[f"robots.{robot}.{self.key}"] = entry
+        return written
+
+
+def _common(cell: Cell, robots: tuple[str, ...], key: str, given: JointSpline) -> dict[str, Any]:
+    """Fields of variables but for their bounds."""
+    rows, places, scale = len(given.coefficients), list[str](), list[float]()
+    for robot in robots:
+        joints = cell.robot(robot).model.joints
+        is_turning = all(joint.is_revolute for joint in joints)
+        path = f"robots.{robot}.{key}.{'coefficients_deg' if is_turning else 'coefficients'}"
+        for index, joint in enumerate(joints):
+            unit = joint_unit(is_revolute=joint.is_revolute).name
+            places.append(f"{path}[{{}}]" + (f"[{index}]" if is_turning else f".{joint.name}_{unit}"))
+            scale.append(USUAL_ANGLE if joint.is_revolute else USUAL_LENGTH)
+    return {
+        "robots": robots,
+        "key": key,
+        "given": given,
+        "names": tuple(place.format(row) for row in range(rows) for place in places),
+        "scale": np.tile(scale, rows),
+        "cost": np.tile(1.0 / (np.array(scale) * rows), rows),
+    }
 
 
 def first_path(

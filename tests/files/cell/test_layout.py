@@ -125,7 +125,7 @@ def test_what_stands_beside_the_ranges(load: Load) -> None:
             "{vary: {worker.bse: {x_mm: [0, 1]}}}",
             "vary.worker.bse: expected one of ROBOT.base, ROBOT.tool, ROBOT.start_deg, ROBOT.start, ROBOT.weights, "
             "ROBOT.path, ROBOT.branch, tasks.TASK.spin_deg, tasks.TASK.robot, part.held_by[0].at, part.at, "
-            "motion.mode, got 'worker.bse'",
+            "motion.mode, null_space, got 'worker.bse'",
         ),
         (
             "{vary: {worker.base: {xx_mm: [0, 1]}}}",

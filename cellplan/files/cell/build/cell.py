@@ -67,6 +67,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         tool=build_tool(entry.tool, read_mesh),
         start=start,
         path=path,
+        null_space=build_path(entry.null_space, model),
         weights=weights,
         home=home,
         acceleration=acceleration_rule(entry, document.acceleration, joints=len(model.joints)),

@@ -54,6 +54,7 @@ class _Reading:
 
     ranges: dict[str, VaryRange] = field(default_factory=dict)
     paths: list[PathRange] = field(default_factory=list)
+    null_space: list[PathRange] = field(default_factory=list)
     choices: list[LayoutChoice] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
 
@@ -71,12 +72,16 @@ def read_layout(
     vary = entry.vary if entry.vary is not None else _usual(context)
     for key, value in vary.items():
         _read_one(key, value, context, reading)
+    if reading.null_space and reading.paths:
+        text = f"unexpected key beside {reading.paths[0].robot}.path: leave one of them out"
+        reading.findings.append(document.key_finding(("layout", "vary", "null_space"), text))
     ties = Ties(entry, reading.ranges, context, reading.findings)
     fixed = ties.fixed()
     _keep_on_floor(entry, reading, document)
     settings = LayoutSettings(
         ranges=tuple(reading.ranges.values()),
         paths=tuple(path for path in reading.paths if f"robots.{path.robot}.path" not in fixed),
+        null_space=next(iter(reading.null_space), None),
         choices=tuple(choice for choice in reading.choices if choice.address not in fixed),
         equal=ties.equal(),
         mirrored=ties.mirrored(),
@@ -102,7 +107,9 @@ def _read_one(key: str, value: Any, context: Context, reading: _Reading) -> None
         return
     if address is None:
         return
-    if address.what == "path":
+    if address.what == "null_space":
+        _keep(reading.null_space, _read_spline(address.name, value, path, context), reading)
+    elif address.what == "path":
         _keep(reading.paths, read_path(address, value, path, context), reading)
     elif address.what in CHOICES:
         _keep(reading.choices, read_choice(address, value, path, context), reading)
@@ -235,11 +242,16 @@ def read_path(address: Address, value: Any, path: KeyPath, context: Context) -> 
     holder = part.held_by[0].robot if part is not None and part.held_by else None
     if address.name != holder:
         return context.document.key_finding(path, f"expected the first holder of the part, got '{address.name}'")
+    return _read_spline(address.name, value, path, context)
+
+
+def _read_spline(robot: str, value: Any, path: KeyPath, context: Context) -> PathRange | Finding:
+    """Settings of splines of a robot, or of all of them in the null space."""
     if value is True:
-        return PathRange(robot=address.name)
+        return PathRange(robot=robot)
     if not isinstance(value, Mapping):
         return context.document.finding(path, f"expected true or {{coefficients: 14, degree: 5}}, got {shown(value)}")
-    return _wrong_spline(value, path, context) or PathRange(robot=address.name, **value)
+    return _wrong_spline(value, path, context) or PathRange(robot=robot, **value)
 
 
 def _wrong_spline(value: Mapping[str, Any], path: KeyPath, context: Context) -> Finding | None:

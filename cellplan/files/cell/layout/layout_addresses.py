@@ -19,6 +19,7 @@ FORMS: Final = (
     "part.held_by[0].at",
     "part.at",
     "motion.mode",
+    "null_space",
 )
 ROBOT: Final = re.compile(r"(?:robots\.)?([^.\[\]]+)\.([^.\[\]]+)(.*)")
 TASK: Final = re.compile(r"tasks\.([^.\[\]]+)\.([^.\[\]]+)(.*)")
@@ -52,8 +53,8 @@ def read_address(text: str, valid: ValidEntries, models: Mapping[str, RobotModel
 
     ``AddressError`` where it names nothing that a layout may change.
     """
-    if text == "motion.mode":
-        return Address(group=text, what="mode", name="")
+    if text in {"motion.mode", "null_space"}:
+        return Address(group=text, what=text.removeprefix("motion."), name="")
     if text.startswith("tasks."):
         return _of_task(text, valid)
     if text.startswith("part."):

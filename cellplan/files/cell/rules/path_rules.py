@@ -1,4 +1,4 @@
-"""Rules of a given joint path: whose it may be, how many numbers it has, and what it excludes."""
+"""Rules of given joint motion, a path or one in the null space: whose it may be, its numbers, and what it excludes."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final
@@ -16,7 +16,7 @@ from cellplan.model.robot.robot import RobotModel, configuration_in_si, start_ke
 from cellplan.model.settings.solver import SolverEntry
 
 SAME_START: Final = 1e-8  # [rad] or [m] by which a start posture may differ from the start of the path: rounding
-REMOVE: Final = "remove it, or remove the path"
+REMOVE: Final = "remove it, or remove the {}"
 
 
 def build_path(entry: JointPathEntry | None, model: RobotModel) -> JointSpline | None:
@@ -28,19 +28,23 @@ def build_path(entry: JointPathEntry | None, model: RobotModel) -> JointSpline |
 
 
 def path_findings(valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
-    """Everything about given joint paths that contradicts robots with a known model, part, motion and solver."""
+    """Everything about given joint motion that contradicts robots with a known model, part, motion and solver."""
     for name, robot in valid.robots.items():
-        if robot.path is None:
-            continue
-        place = ("robots", name, "path")
-        yield from _carries(name, document)
-        yield from _excluded(name, valid, document)
-        if name not in models:
-            continue
-        findings = list(_rows((*place, robot.path.key), robot.path, models[name], document))
-        yield from findings
-        if not findings and robot.given_start is not None:
-            yield from _start(name, valid, models[name], document)
+        for key, entry in (("path", robot.path), ("null_space", robot.null_space)):
+            if entry is None:
+                continue
+            if key == "path":
+                yield from _carries(name, document)
+            elif robot.path is not None:
+                text = f"unexpected key beside robots.{name}.path: {REMOVE.format('path')}"
+                yield document.key_finding(("robots", name, key), text)
+            yield from _excluded(name, key, valid, document)
+            if name not in models:
+                continue
+            findings = list(_rows(("robots", name, key, entry.key), entry, models[name], document))
+            yield from findings
+            if key == "path" and not findings and robot.given_start is not None:
+                yield from _start(name, valid, models[name], document)
 
 
 def _carries(name: str, document: YamlDocument) -> Iterator[Finding]:
@@ -53,29 +57,30 @@ def _carries(name: str, document: YamlDocument) -> Iterator[Finding]:
         return
     for task, _, robot in operators_as_written(document):
         if robot == name:
-            text = f"expected a robot without a task of its own, got '{name}', which does '{task}': {REMOVE}"
+            cure = REMOVE.format("path")
+            text = f"expected a robot without a task of its own, got '{name}', which does '{task}': {cure}"
             yield document.key_finding(place, text)
 
 
-def _excluded(name: str, valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
-    """Modes, programs and methods in which a robot cannot go along a path of its own over the whole clock."""
-    path = f"robots.{name}.path"
+def _excluded(name: str, key: str, valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
+    """Modes, programs and methods in which a robot has no motion of its own over the whole clock."""
+    path, remove = f"robots.{name}.{key}", REMOVE.format(key)
     if valid.program is not None:
-        yield document.key_finding(("program",), f"unexpected key beside {path}, which covers one clock: {REMOVE}")
+        yield document.key_finding(("program",), f"unexpected key beside {path}, which covers one clock: {remove}")
     if (motion := valid.motion) is not None:
         if motion.mode != "simultaneous":
-            text = f"expected simultaneous beside {path}, got '{motion.mode}': choose it, or remove the path"
+            text = f"expected simultaneous beside {path}, got '{motion.mode}': choose it, or remove the {key}"
             yield document.finding(("motion", "mode"), text)
         if motion.cyclic:
-            yield document.finding(("motion", "cyclic"), f"expected false beside {path}, got true: {REMOVE}")
+            yield document.finding(("motion", "cyclic"), f"expected false beside {path}, got true: {remove}")
         for index, lock in enumerate(motion.locked_joints):
-            if lock.robot == name:
-                text = f"expected a joint of another robot beside {path}, got '{name}/{lock.joint}': {REMOVE}"
+            if lock.robot == name and key == "path":
+                text = f"expected a joint of another robot beside {path}, got '{name}/{lock.joint}': {remove}"
                 yield document.finding(("motion", "locked_joints", index), text)
     if (solver := valid.solver) is not None:
-        for key in _nonminimal_keys(solver):
+        for other in _nonminimal_keys(solver):
             text = f"expected the accurate mode (weighted_pseudo_inverse without goals) beside {path}: change it"
-            yield document.finding(("solver", *key.split(".")), text)
+            yield document.finding(("solver", *other.split(".")), text)
 
 
 def _nonminimal_keys(solver: SolverEntry) -> tuple[str, ...]:

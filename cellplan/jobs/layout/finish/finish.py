@@ -40,6 +40,7 @@ from cellplan.search.programs.improve import improve
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.program_problem import ProgramProblem
+from cellplan.search.spline_path.null_space import NullSpaceProblem
 from cellplan.search.variables.variables import Variables
 from cellplan.study.trial import StudyTrial
 from cellplan.study.workers import Workers
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
 NODES: Final = 129  # [-] of the finish
 FINISH: Final = Effort(iterations=25, keys=25, trust=0.2)  # of a layout that is nearly at its best
 FINER: Final = (2, 4)  # [-] times as many nodes of a program whose tools lose their paths
+DENSER: Final = (LayoutProblem, NullSpaceProblem)  # problems that can have more nodes about some times
 REFINED: Final = 3  # [-] times that nodes are added for a shorter cycle before it is certified
 GAIN: Final = 0.001  # [-] share of the cycle that each of them must gain
 LEARNED: Final = 4  # [-] times that a program is improved with the detours of its transfers
@@ -219,7 +221,7 @@ class Finish:
             problem, measures = best.standing.problem, best.standing.measures
             peaks = exceeded_at(best.program, measures.cycle, measures.span)
             denser = refinement.denser_at(peaks, measures.span)
-            if not isinstance(problem, LayoutProblem) or denser is None:
+            if not isinstance(problem, DENSER) or denser is None:
                 break
             refinement = denser
             refined = self._drafted(best.x, best.start, refinement, is_first=False)
@@ -297,7 +299,7 @@ def layout_of(trial: StudyTrial) -> tuple[Array, Array]:
 def problem_of(ready: PreparedSearch, nodes: int, denser: tuple[float, ...] = ()) -> Any:
     """The layout problem at about so many nodes, and more about some times in [s] on their clock."""
     problem = ready.problem(nodes)
-    if denser and isinstance(problem, LayoutProblem):
+    if denser and isinstance(problem, DENSER):
         return problem.finer(ready.schedule, nodes=nodes, denser=denser)
     return problem
 
@@ -363,7 +365,7 @@ def _enlarged(timed: _Timed, program: TimedProgram) -> _Refinement | None:
         return None
     effort = replace(effort, reserve=reserve, also_at=(*effort.also_at, *keys))
     refined = replace(timed.refinement, effort=effort)
-    denser = refined.denser_at([*times, *keys], span) if isinstance(problem, LayoutProblem) else None
+    denser = refined.denser_at([*times, *keys], span) if isinstance(problem, DENSER) else None
     if denser is not None:
         return denser
     more_keys = replace(effort, keys=2 * effort.keys - 1) if keys else effort

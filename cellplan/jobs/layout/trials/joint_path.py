@@ -1,4 +1,4 @@
-"""Joint paths of a positioner that may change: the same job without one, and what means nothing beside one."""
+"""Joint paths and null-space motion that may change: the same job without, and what means nothing beside a path."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,7 +13,9 @@ from cellplan.model.cell.layout import PathRange, VariableKind
 from cellplan.model.motion.motion import Schedule
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.spline_path.nodes import PathNodes
+from cellplan.search.spline_path.null_space import NullSpaceNodes, NullSpaceProblem
 from cellplan.search.spline_path.problem import PathProblem
+from cellplan.search.spline_path.spline_problem import SplineProblem
 from cellplan.search.spline_path.variables import SAMPLES, PathVariables, first_path, with_count
 from cellplan.search.variables.variables import Variables
 from cellplan.search.variables.written import written_start
@@ -23,36 +25,38 @@ from cellplan.search.variables.written import written_start
 class PathSearch:
     """Joint paths of one search."""
 
+    settings: PathRange  # the splines that may change
     layout_variables: Variables  # what varies beside the path
     unled: Variables  # what varies without the path, the start posture of the positioner with it
     schedule: Schedule  # the tasks on the common clock
     start: Array  # start posture of the given layout in [rad] or [m], shape (nq,)
 
     @property
-    def settings(self) -> PathRange:
-        """The path that may change."""
-        return self.layout_variables.settings.paths[0]
+    def robots(self) -> tuple[str, ...]:
+        """Names of the robots that have splines."""
+        return (self.settings.robot,)
 
     @property
     def is_given(self) -> bool:
         """Whether the cell itself gives a path."""
-        return self.layout_variables.base.robot(self.settings.robot).path is not None
+        return self.stated(self.layout_variables.base) is not None
 
     @cached_property
     def given(self) -> JointSpline:
         """The path of the cell, else that of its motion by the pseudo-inverse, else the positioner at its start."""
-        given = self.layout_variables.base.robot(self.settings.robot).path
+        given = self.stated(self.layout_variables.base)
         if given is not None:
-            return self.resampled(given)
+            return given
         fitted = self.fitted(self.unled.given, self.start)
         if fitted is not None:
             return fitted[0]
         still = self.start[self.layout_variables.base.columns(self.settings.robot)]
         return JointSpline(coefficients=np.tile(still, (self.settings.coefficients, 1)), degree=self.settings.degree)
 
-    def resampled(self, path: JointSpline) -> JointSpline:
-        """A path with as many coefficients as are asked for."""
-        return with_count(path, self.settings.coefficients, self.settings.degree)
+    def stated(self, cell: Cell) -> JointSpline | None:
+        """The path that a cell states, with as many coefficients as are asked for; None where it states none."""
+        path = cell.robot(self.settings.robot).path
+        return None if path is None else with_count(path, self.settings.coefficients, self.settings.degree)
 
     def fitted(self, x: Array, start: Array) -> tuple[JointSpline, Array] | None:
         """The path nearest to a motion by the pseudo-inverse, and the start posture; None where a tool is lost.
@@ -80,7 +84,7 @@ class PathSearch:
         departure = replace(self.given, coefficients=coefficients).at(shares) - self.given.at(shares)
         return np.asarray(np.abs(departure).max(axis=0))
 
-    def problem(self, nodes: int, *, bodies: CellDistances, acceleration: Array) -> PathProblem:
+    def problem(self, nodes: int, *, bodies: CellDistances, acceleration: Array) -> SplineProblem:
         """The path problem at about so many nodes.
 
         Args:
@@ -97,22 +101,74 @@ class PathSearch:
         )
 
 
-def without_path(cell: Cell) -> Cell | None:
-    """The cell without the joint path, whose motions by the pseudo-inverse give first paths; None where none varies.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NullSpaceSearch(PathSearch):
+    """Motion of all robots at work in the null space of the tasks: a motion by the pseudo-inverse has none."""
 
-    The start posture of the positioner may vary there, as its path decides it.
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """See ``PathSearch``."""
+        base = self.layout_variables.base
+        working = {*base.positioners, *(task.robot for task in base.tasks)}
+        return tuple(robot.name for robot in base.robots if robot.name in working and robot.model.joints)
+
+    @cached_property
+    def given(self) -> JointSpline:
+        """That of the cell, else none."""
+        return self.stated(self.layout_variables.base) or self._joined(self.unled.base)
+
+    def stated(self, cell: Cell) -> JointSpline | None:
+        """See ``PathSearch``."""
+        is_stated = any(cell.robot(name).null_space is not None for name in self.robots)
+        return self._joined(cell) if is_stated else None
+
+    def fitted(self, x: Array, start: Array) -> tuple[JointSpline, Array] | None:  # noqa: ARG002
+        """See ``PathSearch``."""
+        return self._joined(self.unled.base), start
+
+    def problem(self, nodes: int, *, bodies: CellDistances, acceleration: Array) -> SplineProblem:
+        """See ``PathSearch``."""
+        base, shape = self.layout_variables.base, (self.settings.coefficients, self.settings.degree)
+        return NullSpaceProblem(
+            nodes=NullSpaceNodes.of(base, self.schedule, self.robots, shape=shape, nodes=nodes),
+            path=PathVariables.of_null_space(base, self.robots, self.given),
+            layout=self.layout_variables,
+            bodies=bodies,
+            acceleration=acceleration,
+        )
+
+    def _joined(self, cell: Cell) -> JointSpline:
+        """The splines of all robots together, from zero on; zero where a cell states none."""
+        count, degree = self.settings.coefficients, self.settings.degree
+        parts = []
+        for robot in (cell.robot(name) for name in self.robots):
+            part = np.zeros((count, len(robot.model.joints)))
+            if robot.null_space is not None:
+                part = with_count(robot.null_space, count, degree).coefficients
+            parts.append(part - part[0])
+        return JointSpline(coefficients=np.concatenate(parts, axis=1), degree=degree)
+
+
+def without_path(cell: Cell) -> Cell | None:
+    """The cell without the splines, whose motions by the pseudo-inverse they begin with; None where none may change.
+
+    The start posture of the positioner may vary there where a path decides it.
     """
-    if cell.layout is None or not cell.layout.paths:
+    if cell.layout is None or not (cell.layout.paths or cell.layout.null_space):
         return None
-    name = cell.layout.paths[0].robot
-    robot, values = cell.robot(name), dict[str, object]()
     vary = {short_key(key): value for key, value in written_vary(cell).items()}
-    del vary[f"{name}.path"]
-    if not {f"{name}.start", f"{name}.start_deg"} & vary.keys():
-        is_turning = all(joint.is_revolute for joint in robot.model.joints)
-        vary[f"{name}.start_deg" if is_turning else f"{name}.start"] = True
-    if robot.path is not None:
-        values |= {f"robots.{name}.path": None, **written_start(cell, robot, robot.path.start)}
+    values: dict[str, object] = {
+        f"robots.{robot.name}.null_space": None for robot in cell.robots if robot.null_space is not None
+    }
+    vary.pop("null_space", None)
+    for name in [path.robot for path in cell.layout.paths]:
+        robot = cell.robot(name)
+        del vary[f"{name}.path"]
+        if not {f"{name}.start", f"{name}.start_deg"} & vary.keys():
+            is_turning = all(joint.is_revolute for joint in robot.model.joints)
+            vary[f"{name}.start_deg" if is_turning else f"{name}.start"] = True
+        if robot.path is not None:
+            values |= {f"robots.{name}.path": None, **written_start(cell, robot, robot.path.start)}
     return cell.with_values({**values, "layout.vary": vary})
 
 

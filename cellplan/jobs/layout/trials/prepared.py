@@ -10,7 +10,7 @@ import numpy as np
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.layout.request import LayoutRequest
-from cellplan.jobs.layout.trials.joint_path import PathSearch, resolving, without_path
+from cellplan.jobs.layout.trials.joint_path import NullSpaceSearch, PathSearch, resolving, without_path
 from cellplan.jobs.layout.trials.phases import ProgramPhases, starts_of
 from cellplan.jobs.layout.trials.searched import refuse_unsearchable, searched_cell
 from cellplan.model.cell.cell import Cell, Timing
@@ -33,7 +33,7 @@ from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import CycleTiming, Demands, Objective
 from cellplan.search.programs.problem import Point
 from cellplan.search.programs.program_problem import ProgramProblem
-from cellplan.search.spline_path.problem import PathProblem
+from cellplan.search.spline_path.spline_problem import SplineProblem
 from cellplan.search.starts.generator import StartGenerator
 from cellplan.search.starts.problem import StartProblem
 from cellplan.search.variables.variables import Variables
@@ -93,7 +93,7 @@ class PreparedSearch:
         )
         return _with_solved_start(prepared) if needs_start else prepared
 
-    def problem(self, nodes: int = NODES) -> LayoutProblem | ProgramProblem | PathProblem:
+    def problem(self, nodes: int = NODES) -> LayoutProblem | ProgramProblem | SplineProblem:
         """The problem at about so many nodes: of the layout, or of the joint path and whatever else varies."""
         if self.phases is not None:
             return self.phases.problem(nodes // 2 + 1)
@@ -102,11 +102,11 @@ class PreparedSearch:
             enough = enough_nodes(self.schedule, nodes)
             job = Job.of(variables.base, self.schedule, moving=self.moving, nodes=enough)
             return LayoutProblem(job=job, variables=variables, bodies=self.bodies, acceleration=acceleration)
-        nodes *= ALONG_SPLINE[self.request.timing]
+        nodes *= ALONG_SPLINE[self.request.timing] if self.variables.settings.paths else 1
         return self.path_search.problem(nodes, bodies=self.bodies, acceleration=acceleration)
 
     @cached_property
-    def coarse(self) -> LayoutProblem | ProgramProblem | PathProblem:
+    def coarse(self) -> LayoutProblem | ProgramProblem | SplineProblem:
         """The problem of the trials, at as many nodes as the given layout needs where ``solve`` follows its paths."""
         problem, nodes = self.problem(), NODES
         if not isinstance(problem, LayoutProblem) or isinstance(self._given_start, NoSolutionError):
@@ -131,8 +131,14 @@ class PreparedSearch:
             start = self.given_start
         except NoSolutionError:
             start = np.concatenate([0.5 * np.add(*finite_limits(robot.model)) for robot in self.variables.base.robots])
-        return PathSearch(
-            layout_variables=self.variables, unled=self.unled.variables, schedule=self.schedule, start=start
+        settings = self.variables.settings
+        kind = PathSearch if settings.null_space is None else NullSpaceSearch
+        return kind(
+            settings=settings.null_space or settings.paths[0],
+            layout_variables=self.variables,
+            unled=self.unled.variables,
+            schedule=self.schedule,
+            start=start,
         )
 
     @property
@@ -254,7 +260,7 @@ def _singular(ready: PreparedSearch) -> Array | None:
     if isinstance(problem, ProgramProblem):
         usual = np.concatenate([_usual(phase.job) for phase in problem.phases])
     else:
-        usual = _usual(problem.nodes.job if isinstance(problem, PathProblem) else problem.job)
+        usual = _usual(problem.nodes.job if isinstance(problem, SplineProblem) else problem.job)
     return np.where(usual > SINGULAR_EVERYWHERE, share * usual, 0.0)
 
 
@@ -274,7 +280,7 @@ def values_of(ready: PreparedSearch, x: Array, start: Array) -> dict[str, object
     if ready.phases is not None:
         return ready.phases.values(x, start)
     problem = ready.coarse
-    return (problem if isinstance(problem, PathProblem) else ready.variables).values(x, start)
+    return (problem if isinstance(problem, SplineProblem) else ready.variables).values(x, start)
 
 
 def _with_solved_start(ready: PreparedSearch) -> PreparedSearch:

@@ -70,7 +70,8 @@ def refuse_unsearchable(request: LayoutRequest, cell: Cell) -> None:
         return
     vary = "--free" if request.free else at("layout.vary")
     branches = [f"robots.{choice.name}.branch" for choice in layout.choices if choice.kind is ChoiceKind.BRANCH]
-    for address in [*branches, *(f"robots.{path.robot}.path" for path in layout.paths)]:
+    motions = [f"robots.{path.robot}.path" for path in layout.paths] + ["null_space"] * (layout.null_space is not None)
+    for address in [*branches, *motions]:
         raise InputError(f"{vary}: expected no branch and no joint path with a program, got {address}; leave it out")
     for variable in layout.ranges:
         if variable.kind is VariableKind.START and variable.name not in cell.positioners[:1]:
@@ -87,8 +88,8 @@ def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:
     key = "--misplacement" if request.misplacement is not None else cell.origin.at("layout.misplacement")
     if request.timing is CycleTiming.RETIMED:
         raise InputError(f"{key}: expected a motion by the time laws, got --timing retimed: leave one of them out")
-    if cell.layout.paths or any(robot.path is not None for robot in cell.robots):
-        raise InputError(f"{key}: expected no joint path of a positioner (robots.ROBOT.path): leave one of them out")
+    if cell.layout.null_space is not None or cell.layout.paths or any(robot.path is not None for robot in cell.robots):
+        raise InputError(f"{key}: expected no joint path (robots.ROBOT.path, null_space): leave one of them out")
 
 
 def _refuse_open_feeds(request: LayoutRequest, cell: Cell) -> None:
@@ -218,16 +219,29 @@ def short_key(key: str) -> str:
     return key.removeprefix(PREFIX)
 
 
+def _is_open(cell: Cell) -> bool:
+    """Whether operators do not follow from a path of the positioner, or better share what is rough with it.
+
+    So it is where tasks leave components open or robots have not just six joints; and with demanded feeds, whose ramps
+    a spline over the clock follows badly.
+    """
+    robots = [len(cell.robot(task.robot).model.joints) for task in cell.tasks]
+    tasks = (task.process is not None or task.is_spin_free or len(task.axes) < 6 for task in cell.tasks)
+    return any(tasks) or any(count != 6 for count in robots)
+
+
 def freed(cell: Cell, words: Iterable[str]) -> dict[str, object]:
     """Keys of ``layout.vary``, without ``robots.``, for what is named.
 
     Args:
         words: ``start``: the start posture of the positioner; ``weights``: of all joints; ``path``: the joint path
-            of the positioner; ``spin``: how the tools are turned about their own axes.
+            of the positioner, or motion in the null space; ``spin``: how the tools are turned about their own axes.
     """
     vary = dict[str, object]()
     for word in words:
         match word:
+            case "path" if _is_open(cell):
+                vary["null_space"] = True
             case "start" | "path" if cell.carrier is None:
                 where = cell.origin.at("part.held_by")
                 raise InputError(f"{where}: expected a robot that holds the part, for --free {word}")

@@ -19,7 +19,7 @@ from cellplan.model.seeds import generator
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Demands, Effort
 from cellplan.search.programs.problem import perturbed
-from cellplan.search.spline_path.problem import PathProblem, perturbed_path
+from cellplan.search.spline_path.spline_problem import SplineProblem, perturbed_path
 from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to
@@ -105,13 +105,13 @@ def _path(ready: PreparedSearch, unled: PreparedSearch, proposal: Proposal, numb
         return _Begin(ready.coarse.given, ready.given_start)
     if kind == "attempt":
         cell = _attempted(ready, proposal.index or 0)
-        path = cell.robot(search.settings.robot).path
+        path = search.stated(cell)
         if path is not None:
             others = search.layout_variables.read_from(cell)
-            return _Begin(search.variables(search.resampled(path), others), ready.start_of(cell))
+            return _Begin(search.variables(path, others), ready.start_of(cell))
     if proposal.of is not None and (kind == "improved" or number % 2 or known is None):
         x, start = proposal.begin
-        if kind == "improved" or not isinstance(ready.coarse, PathProblem):
+        if kind == "improved" or not isinstance(ready.coarse, SplineProblem):
             return _Begin(x, start)
         rng = generator(f"layout/{number}", ready.request.seed)
         point = perturbed_path(ready.coarse, x, start, rng, size=proposal.spread or 0.0)
@@ -128,7 +128,7 @@ def _led(ready: PreparedSearch, unled: PreparedSearch, begin: Begin) -> _Begin |
     beside it does not survive.
     """
     begins = [begin]
-    for _ in range(STAGES):
+    for _ in range(STAGES if len(begin[0]) else 0):
         better = improve(unled.coarse, *begins[-1], unled.demands(), STAGE)
         if better is None:
             break

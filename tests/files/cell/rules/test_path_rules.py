@@ -94,6 +94,18 @@ LINES: dict[str, tuple[tuple[tuple[str, str], ...], str]] = {
         "c:22: program: unexpected key beside robots.holder.path, which covers one clock: remove it, or remove the "
         "path",
     ),
+    "motion in the null space of a robot that has it": (
+        (path(start=f"    null_space: {{coefficients_deg: {ROWS}}}\n"),),
+        "c:7: robots.holder.null_space: unexpected key beside robots.holder.path: remove it, or remove the path",
+    ),
+    "motion in the null space with a program": (
+        (
+            (WEIGHTS, f"    null_space: {{coefficients_deg: {ROWS}}}\n"),
+            ("environment:", "program: {}\nenvironment:"),
+        ),
+        "c:22: program: unexpected key beside robots.worker.null_space, which covers one clock: remove it, or remove "
+        "the null_space",
+    ),
     "Euler's steps": (
         (path(), ("environment:", "solver: {integrator: euler}\nenvironment:")),
         "c:22: solver.integrator: expected the accurate mode (weighted_pseudo_inverse without goals) beside "

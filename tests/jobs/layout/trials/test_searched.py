@@ -16,7 +16,8 @@ from cellplan.jobs.layout.trials.searched import freed, searched_cell
 from cellplan.jobs.layout.trials.trial import Begin, _Begin
 from cellplan.jobs.layout.variable_records import path_record
 from cellplan.model.seeds import generator
-from cellplan.search.spline_path.problem import PathProblem, perturbed_path
+from cellplan.search.spline_path.problem import PathProblem
+from cellplan.search.spline_path.spline_problem import perturbed_path
 
 CELLS = Path(__file__).resolve().parents[4] / "cells"
 FOUR = CELLS / "four_robots.yaml"
@@ -39,6 +40,25 @@ def test_words_are_keys_of_what_may_change() -> None:
     assert freed(cell, ["start", "path"]) == {"reis.start_deg": True, "reis.path": True}
     assert set(freed(cell, ["weights"])) == {f"{robot.name}.weights" for robot in cell.robots}
     assert set(freed(cell, ["spin"])) == {f"tasks.{task.name}.spin_deg" for task in cell.tasks}
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"tasks.circle.free": ["spin"]},
+        {"tasks.circle.axes": ["x", "y", "z"]},
+        {"tasks.circle.process": {"feed_mm_s": 100, "ramp_mm": 20}},
+    ],
+)
+def test_a_path_is_motion_in_the_null_space_where_operators_do_not_just_follow(values: dict[str, object]) -> None:
+    assert freed(load_cell(FOUR).with_values(values), ["path"]) == {"null_space": True}
+
+
+def test_a_path_and_motion_in_the_null_space_are_one_line() -> None:
+    request = LayoutRequest(cell=FOUR, vary=("reis.path", "null_space"))
+
+    with pytest.raises(InputError, match=r"layout\.vary\.null_space: unexpected key beside reis\.path: leave one of"):
+        searched_cell(request)
 
 
 def test_another_word_is_one_line() -> None:
