@@ -100,10 +100,12 @@ class _Rates:
         self._J, self._settling = J[0], job.settling * job.constraints.may_move / at_rest
         mobility = job.constraints.may_move / weights
         inverse = self._inverse(J, mobility)
-        own = qd if job.drift is None else qd - job.constraints.may_move * job.drift
-        forces = np.swapaxes(inverse, 1, 2) @ (weights * own)[:, :, None]  # multipliers, as W (qd - u) = J^T lambda
+        relative = qd if job.drift is None else qd - job.constraints.may_move * job.drift
+        forces = (
+            np.swapaxes(inverse, 1, 2) @ (weights * relative)[:, :, None]
+        )  # multipliers, as W (qd - u) = J^T lambda
         bent = mobility[:, None] * changes.forces(forces[..., 0])
-        bent[:, :, nq:] -= (directions.weights / weights[:, None]) * own[:, :, None]
+        bent[:, :, nq:] -= (directions.weights / weights[:, None]) * relative[:, :, None]
         if directions.drift is not None:
             bent[:, :, nq:] += job.constraints.may_move[:, None] * directions.drift
         twists = changes.twists()
