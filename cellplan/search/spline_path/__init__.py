@@ -1,1 +1,1 @@
-"""The path of a positioner as a spline that is improved: operators at all nodes at once, and exact derivatives."""
+"""Splines of joints that are improved: the path of a positioner that operators follow, and motion in the null space."""
