@@ -280,6 +280,18 @@ def test_joints_that_do_not_come_back_have_a_table(passed_run: Any) -> None:
     assert "Repeatability" not in page_of(passed_run)
 
 
+def test_a_smoothed_path_has_its_roughness_with_the_bound_and_its_error(passed_run: Any) -> None:
+    record = phase_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance)
+    points = {"given": 3.25, "smoothed": 2.125, "bound": 2.0625}
+    error = {"position_mm": 0.2, "max_position_error_mm": 0.1875, "max_position_error_at_s": 1.5}
+    name = next(iter(record["tasks"]))
+    record["tasks"][name]["smoothing"] = {"points": points, "axes": None, **error}
+
+    text = Page(report_page(record, cell=passed_run.cell, plots={})).text
+
+    assert f"{name} points, 1/m 3.25 2.12 2.06 0.2 mm 0.188 mm 1.500" in text
+
+
 def test_a_failed_joint_is_reported_in_plain_words(passed_run: Any) -> None:
     locked = (LockedJointEntry(robot="kuka", joint="B2", from_s=2.0),)
     cell = replace(passed_run.cell, motion=replace(passed_run.cell.motion, locked=locked))
