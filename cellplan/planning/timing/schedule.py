@@ -275,9 +275,9 @@ def _at_feed(task: Task, process: ProcessEntry, behind: Array) -> Array:
     """Times in [s] of the stops of a path with a demanded feed: a ramp takes half of its time for its length."""
     lengths, least = np.diff(behind), process.feed * process.ramp
     if lengths.min() < least:
-        key, most = "ramp_s", f"{lengths.min() / process.feed:.3g} s"
+        key, got, most = "ramp_s", f"{process.ramp:g} s", f"{lengths.min() / process.feed:.3g} s"
         if process.ramp_mm is not None:
-            key, most = "ramp_mm", f"{MM * lengths.min() / 2.0:.4g} mm"
+            key, got, most = "ramp_mm", f"{process.ramp_mm:g} mm", f"{MM * lengths.min() / 2.0:.4g} mm"
         if any(process.runs):
             key, other = ("run_in_mm", "run_out_mm") if process.runs[0] else ("run_out_mm", "run_in_mm")
             raise InputError(
@@ -287,7 +287,7 @@ def _at_feed(task: Task, process: ProcessEntry, behind: Array) -> Array:
             )
         raise InputError(
             f"{task.where(f'process.{key}')}: expected ramps that leave the feed of {MM * process.feed:g} mm/s some "
-            f"of each side, got {process.ramp:g} s for one of {MM * lengths.min():.4g} mm; round the corners "
+            f"of each side, got {got} for one of {MM * lengths.min():.4g} mm; round the corners "
             f"(corners: {{blend_mm: 5}}) or make it shorter than {most}"
         )
     return task.moves_from + np.append(0.0, np.cumsum(lengths / process.feed + process.ramp))
