@@ -203,7 +203,8 @@ class PathShapeEntry(OneOf):
             text = "unexpected key, only a path of many points (csv, apt, gcode, outline, face) is smoothed"
             raise rule(text + ("; list them in a table" if self.polyline is not None else ""), "smooth")
         if self.smooth is not None and self.project is not None and self.outline is None:
-            raise rule("unexpected key, a projected path takes its points and normals from the part", "smooth")
+            text = "unexpected key, a projected path takes points and normals from the part; list them in a table (csv)"
+            raise rule(text, "smooth")
         if (self.face is None) != (self.raster is None):
             text = "missing, expected how the face is rastered: {step_mm: 20}"
             raise rule(text if self.raster is None else "unexpected key, it covers a face", "raster")

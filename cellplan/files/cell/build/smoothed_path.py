@@ -18,7 +18,7 @@ from cellplan.model.task.task import ProgrammedPath, SampledPath
 
 GAINED: Final = 0.95  # [-] of the roughness of a file: a tube in which more is left gains nothing
 WORTH: Final = 0.8  # [-] of it: a wider tube that leaves no more is proposed
-DOUBLINGS: Final = 8  # of a tube that gains nothing, to see what a wider one does
+TRIED: Final = 4  # tubes, each four times as wide as the one before, to see what a wider one gains
 LEAST_SIDE: Final = 1e-9  # [m] of a path that can be smoothed; a shorter side is refused where the path is drawn
 
 
@@ -62,7 +62,7 @@ def narrow_tubes(path: SampledPath, entry: SmoothEntry, axis: Array | None) -> I
             continue
         others = {"into_mm": entry.into_mm} if key == "position_mm" else {}
         most = FARTHEST_MM if key == "position_mm" else WIDEST_SMOOTHED_DEG
-        for wider in (min(tube * 2.0**k, most) for k in range(1, DOUBLINGS + 1)):
+        for wider in (min(tube * 4.0**k, most) for k in range(1, TRIED + 1)):
             tried = smoothed(path.listed, SmoothEntry.model_validate({key: wider, **others}), axis)
             with_wider = _share(tried, field) or 0.0
             if with_wider <= WORTH:
