@@ -14,7 +14,7 @@ from typing import Final
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.progress import Progress
-from cellplan.model.report.greatest_feed import GreatestFeed
+from cellplan.model.report.greatest_feed import GreatestFeed, cure_of
 from cellplan.model.settings.entry import FASTEST_MM_S
 from cellplan.model.task.task import Task
 from cellplan.model.units import MM
@@ -62,8 +62,10 @@ class OpenFeed:
 
     def refusal(self, feed: float, greatest: GreatestFeed | None) -> str:
         """Why a feed in [m/s] cannot be held, as one located line; ``greatest`` is None where none can."""
-        why = "" if greatest is None else f": {greatest.text}; the greatest is {MM * greatest.feed:.4g} mm/s"
-        return f"{self.task.where(self.task.feed_key)}: feed {MM * feed:.4g} mm/s cannot be held{why}"
+        text = f"{self.task.where(self.task.feed_key)}: feed {MM * feed:.4g} mm/s cannot be held"
+        if greatest is None:
+            return text
+        return f"{text}: {greatest.text}; the greatest is {MM * greatest.feed:.4g} mm/s{cure_of(greatest.kind)}"
 
 
 @dataclass(slots=True, kw_only=True)

@@ -10,7 +10,8 @@ from builders.three_feeds import THREE_FEEDS, approached
 from cellplan import Cell, Solution, load_cell, solve
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.model.progress import silent
-from cellplan.model.report.greatest_feed import GreatestFeed
+from cellplan.model.report.greatest_feed import BETWEEN_ROWS, GreatestFeed
+from cellplan.runs.greatest_feeds import open_feeds
 from cellplan.runs.solve import solve_motion
 
 WRITTEN = {"motion.timing": "as_written"}
@@ -126,6 +127,26 @@ def test_a_range_without_a_feed_that_holds_is_refused_with_what_binds(tmp_path: 
     )
     assert match, str(caught.value)
     assert 30.0 < float(match[1]) < 50.0
+
+
+def test_a_feed_that_the_rows_are_too_few_for_is_said_with_the_cure(tmp_path: Path) -> None:
+    (opened,) = open_feeds(cell_of(tmp_path, THREE_FEEDS, ring="greatest"))
+    places = np.array([0.0, 0.1])
+    greatest = GreatestFeed(
+        task="ring",
+        feed=0.05,
+        travelled=places,
+        feeds=places + 0.04,
+        binding="ring",
+        kind=BETWEEN_ROWS,
+        at=0.02,
+        at_s=1.0,
+    )
+
+    assert opened.refusal(0.06, greatest).endswith(
+        ": tasks.ring.process.feed_mm_s: feed 60 mm/s cannot be held: ring, tolerance between rows, at 20 mm; the "
+        "greatest is 50 mm/s; a smaller motion.step_s allows more"
+    )
 
 
 @pytest.mark.parametrize(

@@ -43,8 +43,9 @@ class FastestOptions(shared.JobOptions):
         option(
             "--free WORDS",
             "Search the shortest cycle over some of start,weights,path,spin, bases and tools as they are: the start "
-            "posture of the positioner, weights of joints, the positioner's joint path or motion in the null space, "
-            "turns of tools about their axes. The options below --free belong to it.",
+            "posture of the positioner, and of operators that their tasks leave free, weights of joints, the "
+            "positioner's joint path or motion in the null space, turns of tools about their axes. The options below "
+            "--free belong to it.",
         ),
     ] = None
     timing: shared.HowTimed = "laws"

@@ -26,6 +26,7 @@ from cellplan.jobs.layout.trials.proposals import (
 from cellplan.jobs.layout.trials.trial import change_of
 from cellplan.jobs.layout.variable_records import PathRecord, VariableRecord, path_record, variable_records
 from cellplan.model.cell.joint_limits import acceleration_limits
+from cellplan.model.report.greatest_feed import cure_of
 from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import Number, number
 from cellplan.report.record.schema import record_schema
@@ -203,7 +204,7 @@ def _feeds(ready: PreparedSearch, best: CandidateResult | None) -> Iterator[str]
     runs = () if best is None or best.program is None else best.program.solution.runs
     sought = {feed.task.name for feed in ready.opened}
     for feed in (feed for run in runs for feed in run.report.greatest_feeds if feed.task in sought):
-        yield f"task {feed.task}: greatest feed {MM * feed.feed:.6g} mm/s; {feed.text}"
+        yield f"task {feed.task}: greatest feed {MM * feed.feed:.6g} mm/s; {feed.text}{cure_of(feed.kind)}"
 
 
 def _slowed(best: CandidateResult | None) -> Iterator[str]:

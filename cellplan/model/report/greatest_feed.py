@@ -50,3 +50,8 @@ class GreatestFeed:
         ramp = " in a ramp" if self.is_in_ramp else ""
         point = f" ({self.point})" if self.point else ""
         return f"{joint}{self.binding}, {self.kind}{ramp}, at {MM * self.at:.4g} mm{point}"
+
+
+def cure_of(kind: str) -> str:
+    """What allows a greater feed than a limit of some kind, behind what binds; empty where nothing is known to."""
+    return "; a smaller motion.step_s allows more" if kind == BETWEEN_ROWS else ""

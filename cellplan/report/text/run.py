@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.model.report.check_kinds import CHECK_KINDS
-from cellplan.model.report.greatest_feed import BETWEEN_ROWS
+from cellplan.model.report.greatest_feed import cure_of
 from cellplan.model.report.left_out import NOTHING_LEFT_OUT, TITLES, LeftOutKind
 from cellplan.model.solver import METHODS
 from cellplan.report.record.common import Record
@@ -142,9 +142,8 @@ def feed_rows(feeds: Record) -> Iterator[Row]:
             ramp, point = " in a ramp" if feed["in_ramp"] else "", f" ({feed['point']})" if feed["point"] else ""
             binds = [word for word in (feed["binding"], feed["limit"]) if word != name]
             where = f"{', '.join(binds)}{ramp}, at {small(feed['at_mm'])} mm{point} {instant_text(feed)}"
-            cure = "; a smaller motion.step_s allows more" if feed["limit"] == BETWEEN_ROWS else ""
             figure = f"{fixed(feed['greatest_mm_s'])} mm/s"
-            yield "greatest feed", figure, f"task {name} at {fixed(feed['feed_mm_s'])}: {where}{cure}"
+            yield "greatest feed", figure, f"task {name} at {fixed(feed['feed_mm_s'])}: {where}{cure_of(feed['limit'])}"
 
 
 def _closure_rows(closures: Record) -> Iterator[Row]:

@@ -30,10 +30,12 @@ class LayoutProblem(ProblemFields):
     bodies: CellDistances
     acceleration: Array  # see ``Problem``
     is_accelerating: bool = field(init=False)
+    by_start: Array = field(init=False)  # changes of the variables by those of the joints at the start, shape (n, nq)
 
     def __post_init__(self) -> None:
         """Note what the variables and the job know, and whether accelerations count."""
         derive(self, **{name: getattr(self.variables, name) for name in VARIED})
+        derive(self, by_start=np.linalg.pinv(self.variables.directions(self.given).start))
         is_accelerating = bool(np.isfinite(self.acceleration).any())
         derive(self, times=self.job.times, limits=self.job.limits, is_accelerating=is_accelerating)
         derive(self, transfers=Transfers.none(self.job.cell.joint_count, nodes=len(self.times)))
@@ -51,6 +53,7 @@ class LayoutProblem(ProblemFields):
         if not motion.is_followed[0]:
             return None
         q, qd = (np.ascontiguousarray(part[0]) for part in (motion.q, motion.qd))
+        x = x + self.by_start @ (q[0] - layout.start[0])  # a start posture that varies, with the tool on its path
         return Point(x=x, start=q[0], q=q, qd=qd, qdd=self.job.rates @ qd)
 
     def derivatives(self, point: Point) -> PointDerivatives:

@@ -70,7 +70,7 @@ class Measures:
         times, limits, beyond, transfers = problem.times, problem.limits, demands.beyond, problem.transfers
         span = float(times[-1] - times[0])
         pace = Pace.of(problem, point) if demands.timing is CycleTiming.RETIMED else None
-        speeds, accelerations, factor = _loads(problem, point) if pace is None else _paced(problem, point, pace)
+        speeds, accelerations, factor = law_loads(problem, point) if pace is None else _paced(problem, point, pace)
         jerky = 0.0 if pace is None else transfers.window * len(pace.stretches)
         most = demands.clearance + (0.0 if beyond is None else float(beyond.max(initial=0.0)))
         distances = problem.distances(point, key_nodes(problem, effort), effort.within + most)
@@ -189,7 +189,7 @@ def _crests(problem: Problem, values: Array, *, in_magnitude: bool = False) -> P
     return PeakValues.of(problem.times, values, in_magnitude=in_magnitude)
 
 
-def _loads(problem: Problem, point: Point) -> tuple[PeakValues, PeakValues, float]:
+def law_loads(problem: Problem, point: Point) -> tuple[PeakValues, PeakValues, float]:
     """Speeds and accelerations under the laws, and how many times as long as the nodes they must last."""
     speeds = _crests(problem, point.qd / problem.limits.velocity, in_magnitude=True)
     accelerations = _crests(problem, point.qdd / problem.acceleration, in_magnitude=True)

@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.fastest.time_laws import from_both_sides
 from cellplan.jobs.fastest.timed_program import Law, TimedProgram, scaled_values, whole_steps
-from cellplan.jobs.layout.trials.prepared import PreparedSearch, is_fastest
+from cellplan.jobs.layout.trials.prepared import PreparedSearch, is_fastest, least_cycle
 from cellplan.measures.accelerations import joint_accelerations
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress
@@ -17,9 +17,25 @@ from cellplan.runs.early_clearance import EarlyClearance
 from cellplan.runs.greatest_feeds import OpenFeed, open_values
 from cellplan.runs.plan.retiming import row_limits
 from cellplan.runs.solution import Run
+from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import CycleTiming, Objective
 
+# [-] nodes for a row at most: differences of speeds over both steps beside one are then as rows see them
+PER_ROW: Final = 1.4
 EXCEEDS: Final = 0.001  # [-] share of the cycle that a joint may ask for beyond that of the nodes
+
+
+def nodes_of(ready: PreparedSearch, x: Array, start: Array, fewest: int) -> int:
+    """Number of nodes for the finish of a layout: twice as many as in trials, but no more than rows tell apart.
+
+    Args:
+        x: Variables, shape (n,).
+        start: Start posture in [rad] or [m], shape (nq,).
+    """
+    problem, cycle = ready.coarse, None
+    if isinstance(problem, LayoutProblem):
+        cycle = least_cycle(ready, problem, x, start)
+    return max(fewest, min(2 * ready.resolution.nodes - 1, round(PER_ROW * (cycle or 0.0) / ready.cell.motion.step)))
 
 
 def is_scaled(ready: PreparedSearch) -> bool:

@@ -22,6 +22,7 @@ from cellplan.jobs.layout.finish.cycles import (
     is_scaled,
     load_of,
     margins_missed_at,
+    nodes_of,
     shortest,
     time_of,
 )
@@ -48,7 +49,7 @@ from cellplan.study.workers import Workers
 if TYPE_CHECKING:
     from cellplan.search.misplacement.robust import Robust, RobustSearch
 
-NODES: Final = 129  # [-] of the finish
+NODES: Final = 129  # [-] of the finish, or more where trials need more
 FINISH: Final = Effort(iterations=25, keys=25, trust=0.2)  # of a layout that is nearly at its best
 FINER: Final = (2, 4)  # [-] times as many nodes of a program whose tools lose their paths
 DENSER: Final = (LayoutProblem, NullSpaceProblem)  # problems that can have more nodes about some times
@@ -194,7 +195,7 @@ class Finish:
 
     def _certified(self, trial: int, x: Array, start: Array) -> CandidateResult:
         """See ``certified``; the cell is made ready with the choices of the trial."""
-        refinement = _Refinement()
+        refinement = _Refinement(nodes=nodes_of(self.ready, x, start, NODES))
         for solves in count(1):
             timed = self._refined(x, start, refinement, is_first=solves == 1)
             x, start, program, reason = timed.x, timed.start, timed.program, timed.reason

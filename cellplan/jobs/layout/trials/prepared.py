@@ -30,6 +30,7 @@ from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import MOST, Job, enough_nodes
 from cellplan.search.kernel.singular_values import usual_values
 from cellplan.search.programs.layout_problem import LayoutProblem
+from cellplan.search.programs.measures import law_loads
 from cellplan.search.programs.objective import CycleTiming, Demands, Objective
 from cellplan.search.programs.problem import Point
 from cellplan.search.programs.program_problem import ProgramProblem
@@ -39,6 +40,7 @@ from cellplan.search.starts.problem import StartProblem
 from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
+RESOLVED: Final = 0.02  # [-] by which twice as many nodes may change the shortest cycle of the given layout
 UNLIMITED: Final = 1e6  # [s] that motions may last which are timed when they are solved
 NOT_FOLLOWED: Final = "a tool loses its path at the nodes of the search"  # of a layout that solve may yet follow
 # [-] times as many of a motion along a spline, no parabolas
@@ -105,19 +107,18 @@ class PreparedSearch:
         nodes *= ALONG_SPLINE[self.request.timing] if self.variables.settings.paths else 1
         return self.path_search.problem(nodes, bodies=self.bodies, acceleration=acceleration)
 
-    @cached_property
+    @property
     def coarse(self) -> LayoutProblem | ProgramProblem | SplineProblem:
-        """The problem of the trials, at as many nodes as the given layout needs where ``solve`` follows its paths."""
-        problem, nodes = self.problem(), NODES
-        if not isinstance(problem, LayoutProblem) or isinstance(self._given_start, NoSolutionError):
-            return problem
-        while problem.evaluate(problem.given, self._given_start) is None and nodes < MOST and self._is_followed:
-            nodes = 2 * nodes - 1
-            problem = problem.finer(self.schedule, nodes=nodes)
-        return problem
+        """The problem of the trials."""
+        return self.resolution.problem
 
     @cached_property
-    def _is_followed(self) -> bool:
+    def resolution(self) -> "Resolution":
+        """The problem of the trials at as many nodes as the given layout needs."""
+        return _resolution(self, self.problem())
+
+    @cached_property
+    def is_followed(self) -> bool:
         """Whether the tools follow their paths in the given layout, by the method of ``solve``."""
         given = Candidates.of([self.variables.base], self.given_start[None])
         return bool(screen_layouts(self.variables.base, self.schedule, given, moving=self.moving).is_followed[0])
@@ -194,6 +195,50 @@ class PreparedSearch:
             "singular": _singular(self),
         }
         return Demands(**(values | _clock(self) | changes))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Resolution:
+    """The problem of the trials: where ``solve`` follows the paths, tools follow them at its nodes.
+
+    Where the shortest cycle is sought, more of them would not change that of the given layout by much.
+    """
+
+    problem: LayoutProblem | ProgramProblem | SplineProblem
+    nodes: int  # how many were asked for
+    smooth: LayoutProblem | None  # at fewer nodes, where trials begin as less is rough there; None without any
+
+
+def _resolution(ready: PreparedSearch, problem: LayoutProblem | ProgramProblem | SplineProblem) -> Resolution:
+    """The resolution of a search whose problem at the fewest nodes is given."""
+    if not isinstance(problem, LayoutProblem):
+        return Resolution(problem=problem, nodes=NODES, smooth=None)
+    try:
+        start, nodes, smooth = ready.given_start, enough_nodes(ready.schedule, NODES), None
+    except NoSolutionError:
+        return Resolution(problem=problem, nodes=NODES, smooth=None)
+    least = least_cycle(ready, problem, problem.given, start)
+    while nodes < MOST and (ready.is_followed if least is None else least > 0.0):
+        finer = problem.finer(ready.schedule, nodes=2 * nodes - 1)
+        longer = least_cycle(ready, finer, finer.given, start)
+        if least is not None and (longer is None or longer <= (1.0 + RESOLVED) * least):
+            break
+        smooth = None if least is None else smooth or problem
+        problem, nodes, least = finer, 2 * nodes - 1, longer
+    return Resolution(problem=problem, nodes=nodes, smooth=smooth)
+
+
+def least_cycle(ready: PreparedSearch, problem: LayoutProblem, x: Array, start: Array) -> float | None:
+    """Cycle in [s] that the nodes of a problem allow, 0 where none is sought by time laws; None without a motion.
+
+    Args:
+        x: The variables, shape (n,).
+        start: Start posture in [rad] or [m], shape (nq,).
+    """
+    point = problem.evaluate(x, start)
+    if point is None or ready.request.objective is not Objective.CYCLE or ready.request.timing is CycleTiming.RETIMED:
+        return None if point is None else 0.0
+    return law_loads(problem, point)[2] * ready.duration
 
 
 def _of_program(request: LayoutRequest, cell: Cell) -> PreparedSearch:

@@ -4,12 +4,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
+import numpy as np
+
 from cellplan.errors import InputError
 from cellplan.files.cell.changes import read_setting
 from cellplan.files.cell.load import load_cell
 from cellplan.files.input.findings import did_you_mean, listed, shown
 from cellplan.jobs.layout.request import LayoutRequest
-from cellplan.model.cell.cell import Cell, Timing
+from cellplan.model.cell.cell import Cell, Relation, Robot, Timing
 from cellplan.model.cell.layout import ChoiceKind, VariableKind
 from cellplan.model.units import DEG, MM
 from cellplan.runs.greatest_feeds import open_feeds
@@ -234,8 +236,9 @@ def freed(cell: Cell, words: Iterable[str]) -> dict[str, object]:
     """Keys of ``layout.vary``, without ``robots.``, for what is named.
 
     Args:
-        words: ``start``: the start posture of the positioner; ``weights``: of all joints; ``path``: the joint path
-            of the positioner, or motion in the null space; ``spin``: how the tools are turned about their own axes.
+        words: ``start``: the start posture of the positioner, and of operators that their tasks leave free;
+            ``weights``: of all joints; ``path``: the joint path of the positioner, or motion in the null space;
+            ``spin``: how the tools are turned about their own axes.
     """
     vary = dict[str, object]()
     for word in words:
@@ -246,9 +249,9 @@ def freed(cell: Cell, words: Iterable[str]) -> dict[str, object]:
                 where = cell.origin.at("part.held_by")
                 raise InputError(f"{where}: expected a robot that holds the part, for --free {word}")
             case "start":
-                robot = cell.robot(cell.positioners[0])
-                is_turning = all(joint.is_revolute for joint in robot.model.joints)
-                vary[f"{robot.name}.start_deg" if is_turning else f"{robot.name}.start"] = True
+                for robot in (cell.robot(cell.positioners[0]), *_redundant_operators(cell)):
+                    is_turning = all(joint.is_revolute for joint in robot.model.joints)
+                    vary[f"{robot.name}.start_deg" if is_turning else f"{robot.name}.start"] = True
             case "weights":
                 vary |= {f"{robot.name}.weights": True for robot in cell.robots}
             case "path":
@@ -259,3 +262,13 @@ def freed(cell: Cell, words: Iterable[str]) -> dict[str, object]:
                 hint = did_you_mean(word, FREE)
                 raise InputError(f"--free: expected some of {listed(FREE)}, got {shown(word)}{hint}")
     return vary
+
+
+def _redundant_operators(cell: Cell) -> list[Robot]:
+    """Robots with more joints than their tasks prescribe components, which may begin a task in many configurations.
+
+    None of a program, whose tasks begin where the ones before have led.
+    """
+    relations: list[Relation] = [] if cell.program.is_home_to_home else [*cell.tasks, *cell.part.held_by[1:]]
+    counts = {it.robot: len(it.axes) - it.is_spin_free for it in relations}  # at most one each without a program
+    return [robot for robot in cell.robots if len(robot.model.joints) > counts.get(robot.name, np.inf)]

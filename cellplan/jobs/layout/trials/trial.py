@@ -77,7 +77,10 @@ def _evaluated(request: LayoutRequest, number: int, text: str) -> TrialOutcome:
 
 def _improved(ready: PreparedSearch, begin: _Begin, demands: Demands, effort: Effort) -> Improved | None:
     """The local optimum from a start: once more without the usual singular values where they cannot be kept."""
-    improved = improve(ready.coarse, begin.x, begin.start, demands, effort)
+    smooth = ready.resolution.smooth
+    first = None if smooth is None else improve(smooth, begin.x, begin.start, demands, effort)
+    improved = None if first is None else improve(ready.coarse, first.x, first.start, demands, effort)
+    improved = improved or improve(ready.coarse, begin.x, begin.start, demands, effort)
     if improved is None or improved.is_conforming:
         return improved
     demands_met = demands_near(ready, improved.point, clearance=demands.clearance)
