@@ -1,7 +1,8 @@
 """One number of a cell that may be changed while its motion is shown."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from cellplan.errors import InputError
 
@@ -29,8 +30,12 @@ class Variable:
             InputError: The variable is locked, or the value is not finite or out of its range.
         """
         if self.is_locked:
-            raise InputError(f"{self.address}: is locked by layout.lock of the cell; unlock it there")
+            raise InputError(f"{self.address}: is locked by layout.fixed of the cell; take it out there")
         if not math.isfinite(value) or not self.lower <= value <= self.upper:
             expected = f"a number from {self.lower:g} to {self.upper:g} {self.unit}"
             raise InputError(f"{self.address}: expected {expected}, got {value:g}")
         return value
+
+    def record(self, *, value: float) -> dict[str, Any]:
+        """The variable with its present value, for pages."""
+        return {**asdict(self), "value": value}

@@ -199,7 +199,7 @@ def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewReco
     geometries = Geometries()
     scene = unsolved_scene(cell, geometries, progress=progress)
     about = {"source": path.as_posix(), "settings": list(request.settings)}
-    return {**_record("cell", cell, geometries, [scene]), **about}, target
+    return {**page_record("cell", cell, geometries, [scene]), **about}, target
 
 
 def _target(request: ViewRequest, usual: Path) -> Path:
@@ -223,7 +223,7 @@ def write_view_of_blocked(error: BlockedTransferError, target: Path) -> bool:
     geometries, cell = Geometries(), error.best.scene.cell
     target.parent.mkdir(parents=True, exist_ok=True)
     scene = blocked_scene(error.best, str(error), geometries)
-    write_view(_record("cell", cell, geometries, [scene]), target)
+    write_view(page_record("cell", cell, geometries, [scene]), target)
     return True
 
 
@@ -253,7 +253,7 @@ def _view_of_run(request: ViewRequest, progress: Progress) -> ViewRecord:
 def _record_of_run(stored: StoredRun, cell: Cell) -> ViewRecord:
     geometries = Geometries()
     scene = run_scene(stored, cell, geometries)
-    return {**_record("run", cell, geometries, [scene]), "source": stored.manifest.cell_file}
+    return {**page_record("run", cell, geometries, [scene]), "source": stored.manifest.cell_file}
 
 
 def _view_of_study(request: ViewRequest, progress: Progress) -> ViewRecord:
@@ -264,10 +264,11 @@ def _view_of_study(request: ViewRequest, progress: Progress) -> ViewRecord:
     cell = cell_of_study(request.path, request.cell, request.allow_dirs)
     geometries = Geometries()
     scenes = list(study_scenes(study, cell, str(request.path / RESULT), geometries, progress))
-    return _record("study", cell, geometries, scenes)
+    return page_record("study", cell, geometries, scenes)
 
 
-def _record(kind: str, cell: Cell, geometries: Geometries, scenes: list[Record]) -> ViewRecord:
+def page_record(kind: str, cell: Cell, geometries: Geometries, scenes: list[Record]) -> ViewRecord:
+    """The record of a page: of a run, a cell or a study, as ``kind`` says."""
     return {
         "schema": SCHEMA,
         "kind": kind,

@@ -1,0 +1,98 @@
+"""Advice: for each base the step that helps most by the exact derivatives, and what it would do."""
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.jobs.layout.trials.limits import effects, standing_of
+from cellplan.model.cell.layout import VariableKind
+from cellplan.model.units import MM
+from cellplan.report.record.common import Record
+from cellplan.search.programs.objective import Demands, Effort, Objective
+from cellplan.search.programs.program import LinearProgram
+from cellplan.search.programs.rows import Linear
+from cellplan.session.answer import Look
+from cellplan.session.variables import LiveVariables
+
+TRUST: Final = 2.0  # [-] usual steps of 0.1 m that an arrow is long at most
+SHORTEST: Final = 1e-3  # [m] of an arrow
+ALONG: Final = 0.98  # [-] share of a step along an axis that is named by it
+AXES: Final = "xyz"
+SHOWN: Final = (("margin_deg", "deg margin"), ("clearance_mm", "mm clearance"), ("cycle_s", "s"))
+LEAST: Final = {"margin_deg": 0.01, "clearance_mm": 0.01, "cycle_s": 0.001}  # what is not worth saying
+
+
+def advice(look: Look, variables: LiveVariables) -> list[Record]:
+    """An arrow for each base that may move: towards what is missed, else towards a shorter cycle.
+
+    Empty for a motion that the kernel does not have, or that breaks off.
+    """
+    problem, motion = look.block.problem, look.motion
+    if problem is None or not motion.is_followed or motion.is_planned:
+        return []
+    is_missed = any(not figure.is_met for figure in look.figures)
+    span, times = float(motion.times[-1] - motion.times[0]), [it.at for it in look.figures if it.at is not None]
+    demands = Demands(
+        objective=Objective.CONFORMING if is_missed else Objective.CYCLE,
+        margin=np.zeros(motion.q.shape[1]),
+        duration=span if is_missed else None,
+    )
+    standing = standing_of(problem, motion.point(), demands, Effort(also_at=tuple(times)))
+    linear = Linear.of(problem, standing.measures)
+    program = LinearProgram.of(linear, demands, Effort().reserve, TRUST)
+    by_variable = {key: _finite(values) for key, values in effects(standing, np.ones(len(motion.x))).items()}
+    records = list[Record]()
+    for robot, base in enumerate(look.block.cell.robots):
+        columns = _columns(variables, base.name)
+        step = _best(program, columns, len(motion.x))
+        if step is not None and (length := float(np.linalg.norm(step * problem.scale))) >= SHORTEST:
+            dx = step * problem.scale
+            direction = np.zeros(3)
+            for column in columns:
+                direction[variables.layout.tied.ranges[column].index] = dx[column] / length
+            gains = {key: float(values @ dx) for key, values in by_variable.items()}
+            records.append(_record(robot, direction, MM * length, gains))
+    return records
+
+
+def _columns(variables: LiveVariables, robot: str) -> list[int]:
+    """Places of the position of a base among the variables, as far as it may move."""
+    return [
+        column
+        for column, variable in enumerate(variables.layout.tied.ranges)
+        if variable.kind is VariableKind.BASE
+        and variable.name == robot
+        and variable.index < (3 if variables.listed[column].is_varied else 2)
+        and not variables.listed[column].is_locked
+    ]
+
+
+def _best(program: LinearProgram, columns: list[int], count: int) -> Array | None:
+    """The best step of some variables alone, in usual steps, shape (n,); None where there is none."""
+    may_move = np.zeros(len(program.box[0]), dtype=bool)
+    may_move[columns] = True
+    lower, upper = (np.where(may_move, side, 0.0) for side in program.box)
+    solved = replace(program, box=(lower, upper)).priced(program.price).solve() if columns else None
+    return None if solved is None else solved.z[:count]
+
+
+def _record(robot: int, direction: Array, length: float, gains: dict[str, float]) -> Record:
+    """An arrow in plain values."""
+    axis = int(np.argmax(np.abs(direction)))
+    named = f"{'+' if direction[axis] > 0.0 else '-'}{AXES[axis]}"
+    if abs(direction[axis]) < ALONG:
+        named = f"({', '.join(f'{component:.2f}' for component in direction + 0.0)})"
+    said = [f"{gains[key]:+.3g} {unit}" for key, unit in SHOWN if abs(gains[key]) >= LEAST[key]]
+    return {
+        "robot": robot,
+        "direction": [round(component, 6) + 0.0 for component in direction.tolist()],
+        "step_mm": round(length, 3),
+        "text": f"{length:.3g} mm along {named}: {', '.join(said) or 'nothing changes much'}",
+    }
+
+
+def _finite(values: list[float | None]) -> Array:
+    """Effects, 0 where there is none."""
+    return np.array([0.0 if value is None else value for value in values])

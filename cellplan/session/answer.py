@@ -1,0 +1,157 @@
+"""Answers of a live cell as plain records: lengths in mm, angles in deg, times in s, poses in m."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.jobs.view.describe import place_record
+from cellplan.jobs.view.result import POSE_DECIMALS
+from cellplan.jobs.view.run_scene import motion_record
+from cellplan.model.cell.cell import Cell
+from cellplan.report.record.common import Record
+from cellplan.report.record.figures import figures_of
+from cellplan.scene.bodies import is_ground, scene_bodies
+from cellplan.session.blocks import Block
+from cellplan.session.figures import Figure, Loads, clearance_figures, distances_of, joint_figures
+from cellplan.session.judge import Judgement
+from cellplan.session.motion import LiveMotion
+
+PLANNED: Final = "planned"
+BREAKS_OFF: Final = "breaks off"
+FAILS: Final = "fails"
+CERTIFIED: Final = "certified"
+UNKNOWN: Final = "unknown"
+SHARE_DECIMALS: Final = 5
+TIME_DECIMALS: Final = 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Look:
+    """A block at some values: its motion and its figures, and what is known of it at rest."""
+
+    block: Block
+    motion: LiveMotion
+    loads: Loads
+    figures: tuple[Figure, ...]
+    judgement: Judgement | None = None  # None while it moves
+
+    @classmethod
+    def at(cls, block: Block, motion: LiveMotion) -> "Look":
+        """A block with its motion."""
+        loads = Loads.of(block.cell, motion)
+        figures = [*joint_figures(block.cell, motion, loads)]
+        if motion.is_begun:
+            figures += clearance_figures(block, motion, distances_of(block.bodies, motion))
+        return cls(block=block, motion=motion, loads=loads, figures=tuple(figures))
+
+    def judged(self, judgement: Judgement) -> "Look":
+        """The same with what is known at rest."""
+        return replace(self, judgement=judgement, figures=tuple(_reported(it, judgement) for it in self.figures))
+
+    @property
+    def state(self) -> str:
+        """Whether its motion breaks off, fails or is planned; without a proof nothing is more than planned."""
+        known = self.judgement
+        if (known is None and not self.motion.is_followed) or (known is not None and known.lost):
+            return BREAKS_OFF
+        if known is not None:
+            return PLANNED if known.passed else FAILS
+        return PLANNED if all(figure.is_met for figure in self.figures) else FAILS
+
+    @property
+    def words(self) -> str:
+        """What becomes of it, in one line."""
+        known, motion = self.judgement, self.motion
+        if known is not None and known.lost:
+            return known.lost
+        if known is None and not motion.is_followed:
+            where = "no tool loses its path" if not motion.is_begun else f"a tool loses its path at {motion.lost_at:.3f} s"
+            return motion.why or ("the start of a path is out of reach" if not motion.is_begun else where)
+        if known is not None and known.lines:
+            more = f" (and {len(known.lines) - 1} more)" if len(known.lines) > 1 else ""
+            return f"{known.lines[0]}{more}"
+        missed = [figure.words for figure in self.figures if not figure.is_met]
+        if known is None and missed:
+            return "; ".join(missed)
+        if known is not None and known.is_done:
+            return "all checks pass on a coarser clock; certify proves it on that of the cell"
+        return "all limits are kept at the nodes looked at"
+
+    @property
+    def record(self) -> Record:
+        """What an answer says of the shown block."""
+        motion = self.motion
+        worst = self.loads.worst(self.block.cell)
+        return {
+            "state": self.state,
+            "verdict": f"{self.state}: {self.words}",
+            "figures": [figure.record for figure in self.figures],
+            "lost_at": motion.lost_at,
+            "motion": motion_record(motion.times, motion.q, []),
+            "worst": {
+                "times": np.round(motion.times, TIME_DECIMALS).tolist(),
+                "values": (np.round(worst, SHARE_DECIMALS) + 0.0).tolist(),
+            },
+        }
+
+    @property
+    def strip(self) -> Record:
+        """What stands of it among all blocks."""
+        return {"name": self.block.name, "state": self.state, "text": self.words}
+
+
+REPORTED: Final[Mapping[str, tuple[str, str, float]]] = {
+    "margin": ("min_margin_deg", "min_margin_joint", 1.0),
+    "velocity": ("max_velocity_ratio", "max_velocity_joint", 100.0),
+    "acceleration": ("max_acceleration_ratio", "max_acceleration_joint", 100.0),
+}  # keys of the figures of reports, and their scale here
+
+
+def _reported(figure: Figure, judgement: Judgement) -> Figure:
+    """A figure as a report has it; whether a clearance is kept, as the certificate says."""
+    if figure.name == "clearance" and judgement.is_clear is not None:
+        return replace(figure, is_met=judgement.is_clear)
+    if judgement.report is None or figure.name not in REPORTED:
+        return figure
+    value_key, subject_key, scale = REPORTED[figure.name]
+    figures = figures_of([judgement.report])
+    value, subject = figures.recorded(value_key), figures.recorded(subject_key)
+    if value is None:
+        return figure
+    is_met = figure.limit is None or (value >= 0.0 if figure.name == "margin" else scale * value <= figure.limit)
+    return replace(figure, value=scale * float(value), binds=subject or figure.binds, is_met=is_met)
+
+
+def poses(cell: Cell, given: Mapping[str, Array]) -> Record:
+    """Where bases, tools and bodies are.
+
+    Args:
+        cell: The cell as its variables have it.
+        given: Poses of the bodies in the scene that the page was given, in its order, by name.
+    """
+    bodies = sorted(scene_bodies(cell), key=is_ground)
+    places = {name: place for place, name in enumerate(given)}
+    return {
+        "bases": [numbers(robot.X_WB) for robot in cell.robots],
+        "tools": [numbers(robot.model.X_BF @ robot.tool.X_FT) for robot in cell.robots],
+        "bodies": {
+            str(places[body.name]): numbers(body.X_BS)
+            for body in bodies
+            if body.name in places and not np.array_equal(body.X_BS, given[body.name])
+        },
+        "part": place_record(cell, 0.0)["pose"],
+    }
+
+
+def numbers(X: Array) -> list[float]:
+    """A pose of shape (4, 4) as sixteen numbers, row by row."""
+    return [number + 0.0 for number in np.round(X, POSE_DECIMALS).ravel().tolist()]
+
+
+def strip_of(blocks: Sequence[Block], looks: Mapping[int, Look]) -> list[Record]:
+    """All blocks, those that were not looked at as unknown."""
+    unknown: dict[str, Any] = {"state": UNKNOWN, "text": "not asked yet"}
+    return [looks[place].strip if place in looks else {"name": it.name, **unknown} for place, it in enumerate(blocks)]

@@ -1,0 +1,126 @@
+"""Engine of a session: the values of a live cell, the block that is shown, and what is known of all blocks."""
+
+from collections.abc import Iterator, Mapping
+
+from cellplan.errors import InputError
+from cellplan.jobs.view.cell_scene import standing_scene
+from cellplan.jobs.view.describe import base_records
+from cellplan.jobs.view.geometries import Geometries
+from cellplan.jobs.view.write import page_record, placed_scene
+from cellplan.model.cell.cell import Cell
+from cellplan.report.record.common import Record
+from cellplan.session.advice import advice
+from cellplan.session.answer import Look, poses, strip_of
+from cellplan.session.blocks import LiveCell
+from cellplan.session.judge import judged
+from cellplan.session.motion import follow, of_rows
+from cellplan.session.starts import as_given, written_starts
+from cellplan.session.variable import Variable
+
+
+class Engine:
+    """A cell at values of its variables.
+
+    Attributes:
+        given: The cell as it was read.
+        values: Values in file units by address; those of the file where there is none.
+        shown: Number of the block that is shown.
+        is_settled: Whether all is known that is asked at rest.
+    """
+
+    def __init__(self, cell: Cell, shown: int = 0) -> None:
+        """Plan the layout of a cell."""
+        self.given = self._live = LiveCell.of(cell)
+        self.shown = min(shown, len(self.given.blocks) - 1)
+        self._bodies = {body.name: body.X_BS for body in self.given.scene.bodies}
+        self._obstacles = dict[str, float]()
+        self._looks = dict[int, Look]()
+        self.move({})
+
+    def move(self, values: Mapping[str, float], block: int | None = None) -> None:
+        """Look at a block at other values; None for the one that is shown.
+
+        Raises:
+            InputError: There is no such block, or an obstacle cannot stand there.
+        """
+        if block is not None and not 0 <= block < len(self.given.blocks):
+            raise InputError(f"block: expected a number below {len(self.given.blocks)}, got {block}")
+        self._place_obstacles({it: value for it, value in values.items() if self.given.variables.is_of_obstacle(it)})
+        self.shown, self.values = self.shown if block is None else block, {**values}
+        self._advice, self.is_settled = list[Record](), False
+        self._x = self._live.variables.numbers(values)
+        last, shown = self._looks.get(self.shown), self._live.blocks[self.shown]
+        self._looks = {self.shown: Look.at(shown, follow(shown, self._x, None if last is None else last.motion))}
+
+    def variable(self, address: str) -> Variable:
+        """The variable at an address.
+
+        Raises:
+            InputError: There is none.
+        """
+        if (variable := self.given.variables.at(address)) is None:
+            raise InputError(f"{address}: expected the address of a number that may be changed, got another one")
+        return variable
+
+    def starts(self) -> dict[str, object]:
+        """Where robots begin in the shown block, by address; as the file says where nothing else was changed."""
+        look, cell = self._looks[self.shown], self.given.cell
+        if not look.motion.is_begun:
+            return {}
+        written = written_starts(cell, look.block, look.motion.q[0])
+        listed = self.given.variables.listed
+        is_given = all(self.values.get(it.address, it.given) == it.given for it in listed)
+        return as_given(cell, written) if is_given else written
+
+    def settle(self, cell: Cell) -> Iterator[None]:
+        """Find out all that is asked at rest, piece by piece: the shown block, the others, what would help.
+
+        Args:
+            cell: The cell as it would be saved.
+        """
+        look = self._looks[self.shown]
+        for judgement in judged(cell, look.block, self.given.scene):
+            if not look.motion.is_followed and len(judgement.q):
+                look = Look.at(look.block, of_rows(self._x, judgement.times, judgement.q))
+            look = self._looks[self.shown] = look.judged(judgement)
+            yield None
+        for place, block in enumerate(self._live.blocks):
+            if place not in self._looks:
+                self._looks[place] = Look.at(block, follow(block, self._x))
+                yield None
+        self._advice = advice(look, self._live)
+        self.is_settled = True
+        yield None
+
+    def record(self) -> Record:
+        """What is known of the present values."""
+        listed = self.given.variables.listed
+        return {
+            "values": {it.address: self.values.get(it.address, it.given) for it in listed},
+            "block": self.shown,
+            **self._looks[self.shown].record,
+            "poses": poses(self._live.variables.layout.placed(self._x), self._bodies),
+            "strip": strip_of(self._live.blocks, self._looks),
+            "advice": self._advice,
+            "is_settled": self.is_settled,
+        }
+
+    def page(self) -> Record:
+        """What a page needs once: the picture of the cell, its variables and its blocks."""
+        geometries, scene = Geometries(), self.given.scene
+        shown = {**standing_scene(scene, geometries), "bases": base_records(scene.cell)}
+        return {
+            "view": page_record("cell", scene.cell, geometries, [shown]),
+            "variables": [
+                it.record(value=self.values.get(it.address, it.given)) for it in self.given.variables.listed
+            ],
+            "blocks": [{"name": block.name, "tasks": list(block.tasks)} for block in self.given.blocks],
+            "demands": {"clearance_mm": scene.cell.checks.clearance_mm},
+        }
+
+    def _place_obstacles(self, values: Mapping[str, float]) -> None:
+        """Let obstacles stand where values of theirs say, by address."""
+        if values != self._obstacles:
+            cell = self.given.cell.with_values(values) if values else self.given.cell
+            self._live = self.given.on(cell, placed_scene(self.given.scene, cell))
+            self._obstacles = {**values}

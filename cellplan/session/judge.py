@@ -1,0 +1,153 @@
+"""Judgement of a live cell at rest: planned and checked as ``solve`` does, on a coarser clock, piece by piece.
+
+The motion between two rows is linear in the joints, on a clock of a thousand rows as on the finer one of the cell, and
+the certificate holds at all times between rows. So the verdict is that of ``solve`` up to what a tool, which is on its
+path at every row, is beside it between two of them: some micrometres.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.certify import certify
+from cellplan.certify.run_pairs import scene_of_run, with_straight_move
+from cellplan.checks.clearance.mounting import check_mounting
+from cellplan.checks.clearance.phase_ends import JudgedPhase
+from cellplan.checks.task_rules import with_task_rules
+from cellplan.checks.verify import verify_motion
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.geometry.arrays import Array
+from cellplan.jobs.view.write import placed_scene
+from cellplan.model.cell.cell import Cell, stacked_positions
+from cellplan.model.motion.motion import JointTable, Schedule
+from cellplan.model.progress import silent
+from cellplan.model.report.report import Report
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.sequence.stages import program_stages
+from cellplan.planning.timing.schedule import clock_paths
+from cellplan.runs.greatest_feeds import open_feeds
+from cellplan.runs.plan.run import plan_run
+from cellplan.runs.solve import solve_motion
+from cellplan.scene.scene import Scene
+from cellplan.session.blocks import Block
+from cellplan.session.motion import with_coarser_steps
+
+ROWS_AT_ONCE: Final = 250  # [-] of which the certificate is asked in one piece
+NEAR: Final = 0.05  # [m] within which the pair is looked for that a failed certificate is about
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Judgement:
+    """What is known of a block at rest."""
+
+    is_done: bool = False  # whether everything was asked
+    lines: tuple[str, ...] = ()  # what fails, as reports word it
+    lost: str = ""  # why there is no motion; empty where there is one
+    report: Report | None = None  # of the block
+    times: Array = field(default_factory=lambda: np.empty(0))  # of its rows in [s], shape (N,)
+    q: Array = field(default_factory=lambda: np.empty((0, 0)))  # its rows in [rad] or [m], shape (N, nq)
+    is_clear: bool | None = None  # whether the certificate holds; None while that is not known
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing fails that was asked."""
+        return not self.lost and not self.lines
+
+
+def judged(cell: Cell, block: Block, first: Scene) -> Iterator[Judgement]:
+    """What is known of a block, more from piece to piece.
+
+    Args:
+        cell: The cell as it would be saved.
+        block: The block of the live cell that is shown.
+        first: The scene of the given layout.
+    """
+    try:
+        phases = _of_program(cell, block, first) if cell.program.is_home_to_home else _of_cell(cell, block)
+    except (InputError, NoSolutionError) as error:
+        yield Judgement(is_done=True, lost=str(error).splitlines()[0])
+        return
+    shown = next((it for it in phases if it.report.phase in (None, block.name)), phases[0])
+    q = stacked_positions(cell, shown.report.q)
+    known = Judgement(report=shown.report, times=shown.schedule.times, q=q, lines=_failed([shown.report]))
+    yield known
+    is_clear, lines = True, list[str]()
+    for phase in phases:
+        for line in _unclear(phase.scene, phase.schedule, stacked_positions(cell, phase.report.q)):
+            if line:
+                is_clear = False
+                lines.append(line)
+                break
+            yield known
+    reports = with_task_rules(cell, phases, [phase.report for phase in phases])
+    yield replace(known, is_done=True, is_clear=is_clear, lines=(*_failed(reports), *lines))
+
+
+def _failed(reports: Sequence[Report]) -> tuple[str, ...]:
+    """What fails, each once."""
+    return tuple(dict.fromkeys(check.message for report in reports for check in report.checks if not check.passed))
+
+
+def _of_cell(cell: Cell, block: Block) -> list[JudgedPhase]:
+    """The phases of a cell without a program, as ``solve`` has them, all but their clearance."""
+    if not open_feeds(cell):  # these are sought in the file
+        cell = with_coarser_steps(cell, len(block.schedule.times) - 1)
+    _, solution = solve_motion(cell, task=None, progress=silent)
+    return [_with_depths(run.scene, run.schedule, run.report) for run in solution.runs]
+
+
+def _of_program(cell: Cell, block: Block, first: Scene) -> list[JudgedPhase]:
+    """The block of a program that is shown, from the starts of the cell; straight moves are as they were planned."""
+    stages = [stage for stage in program_stages(cell) if stage.phase.name == block.name]
+    stage = stages[0]
+    robots = [
+        replace(robot, start=known.start) if robot.start is None or robot.name in stage.phase.idle else robot
+        for robot, known in zip(stage.cell.robots, block.cell.robots, strict=True)
+    ]
+    own = with_coarser_steps(replace(stage.cell, robots=tuple(robots)), len(block.schedule.times) - 1)
+    paths = clock_paths(own, [build_toolpath(task, own.part) for task in own.tasks])
+    planned = plan_run(own, paths, stage.phase)
+    scene = replace(placed_scene(first, own), cell=own)
+    tables = [
+        JointTable(
+            robot=robot.name,
+            joints=robot.model.joint_names,
+            times=planned.motion.times,
+            q=planned.motion.q[:, own.columns(robot.name)],
+        )
+        for robot in own.robots
+    ]
+    moving, idle = stage.phase.moving, stage.phase.idle
+    report = verify_motion(scene, planned.schedule, tables, moving=moving, idle=idle)
+    return [_with_depths(scene, planned.schedule, replace(report, phase=block.name))]
+
+
+def _with_depths(scene: Scene, schedule: Schedule, report: Report) -> JudgedPhase:
+    """A phase with the depth of what holds or stands."""
+    depths = check_mounting(scene, stacked_positions(scene.cell, report.q), schedule.times)
+    return JudgedPhase(scene=scene, schedule=schedule, report=replace(report, checks=(*report.checks, *depths)))
+
+
+def _unclear(scene: Scene, schedule: Schedule, q: Array) -> Iterator[str]:
+    """For each piece of a motion which bodies are too near; an empty line for one that is certified."""
+    scene = scene_of_run(scene, schedule.names)
+    scene, times, q = with_straight_move(scene, schedule.times, q)
+    for begin in range(0, len(q) - 1, ROWS_AT_ONCE):
+        rows = slice(begin, min(begin + ROWS_AT_ONCE, len(q) - 1) + 1)
+        yield "" if certify(scene, q[rows], with_minimum=False).is_met else _nearest(scene, times[rows], q[rows])
+
+
+def _nearest(scene: Scene, times: Array, q: Array) -> str:
+    """The pair that is nearest to its demand at some rows, in words."""
+    places = np.unique(np.linspace(0, len(q) - 1, 33).round().astype(np.intp))
+    near = scene.near(q[places], NEAR)
+    short = near.distances - np.array([scene.pairs[row].demand for row in near.rows.tolist()])
+    if not len(short):
+        return f"clearance: not certified from {times[0]:.3f} s to {times[-1]:.3f} s"
+    worst = int(np.argmin(short))
+    names, pair = scene.names(scene.pairs[near.rows[worst]]), scene.pairs[near.rows[worst]]
+    distance, at = 1e3 * float(near.distances[worst]), float(times[places[near.samples[worst]]])
+    apart = f"{distance:.3g} mm apart" if distance > 0.0 else "touch"
+    return f"clearance: {names[0]} and {names[1]} {apart} at {at:.3f} s, {1e3 * pair.demand:g} mm demanded"

@@ -1,0 +1,131 @@
+"""Motion of a block of a live cell: near the last one by the kernel, by the planner where the kernel does not apply."""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell.cell import Cell
+from cellplan.planning.start.seeds import with_seeds
+from cellplan.runs.plan.run import plan_run
+from cellplan.search.kernel.run import Motions, run, run_near
+from cellplan.search.programs.layout_problem import LayoutProblem
+from cellplan.search.programs.problem import Point
+from cellplan.session.blocks import Block
+
+ROWS: Final = 1000  # [-] of a motion that is planned while it is looked at, where the steps of its cell are finer
+APART: Final = 1e-6  # [rad] or [m] between two starts that are the same
+FACTORS: Final = (50, 40, 25, 20, 16, 10, 8, 5, 4, 2)  # [-] times as long steps, the longest first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LiveMotion:
+    """A motion of all joints as far as all tools follow their paths."""
+
+    x: Array  # the variables of the layout in [m] and [rad], shape (n,)
+    times: Array  # in [s] on the clock of the block, shape (N,); two may be equal where speeds jump
+    q: Array  # stacked joint positions in [rad] or [m], shape (N, nq)
+    qd: Array  # their speeds, shape (N, nq)
+    qdd: Array  # their accelerations, shape (N, nq)
+    lost_at: float | None = None  # when a tool loses its path in [s]; None where all are followed
+    is_begun: bool = True  # whether all tools come to the starts of their paths
+    why: str = ""  # what the planner says of a motion that there is not
+    is_planned: bool = False  # whether its rows are those of the planner
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether the whole job is done."""
+        return self.lost_at is None
+
+    def point(self) -> Point:
+        """The same for the programs of a search, without the derivatives that are known."""
+        return Point(x=self.x, start=self.q[0], q=self.q, qd=self.qd, qdd=self.qdd)
+
+
+def follow(block: Block, x: Array, near: LiveMotion | None = None) -> LiveMotion:
+    """The motion of a block at values of the variables.
+
+    It begins on the branch of the start that is kept to; where that leads nowhere, on that of the motion nearby.
+
+    Args:
+        x: The variables of the layout in [m] and [rad], shape (n,).
+        near: A motion nearby, which makes it quicker.
+    """
+    starts = [block.start]
+    if near is not None and near.is_begun and np.abs(near.q[0] - block.start).max() > APART:
+        starts.append(near.q[0])
+    best: LiveMotion | None = None
+    for start in starts:
+        motion = _planned(block, x, start) if block.problem is None else _by_kernel(block.problem, x, start, near)
+        if motion.is_followed:
+            return motion
+        if best is None or (motion.lost_at or 0.0) > (best.lost_at or 0.0):
+            best = motion
+    return best or motion
+
+
+def _by_kernel(problem: LayoutProblem, x: Array, start: Array, near: LiveMotion | None) -> LiveMotion:
+    """The motion at the nodes of the kernel."""
+    job, layouts = problem.job, problem.variables.layouts(x[None], start[None])
+    is_near = near is not None and near.is_followed and len(near.q) == len(job.times)
+    motions = run_near(job, layouts, near.q[None]) if near is not None and is_near else run(job, layouts)
+    q, qd, lost_at = _followed(motions, job.times)
+    count = len(q)
+    rates = job.rates[:count, :count] if count == len(job.times) else np.zeros((count, count))
+    is_begun = bool(np.isfinite(lost_at) or np.isposinf(lost_at))
+    if not is_begun:
+        q, qd = layouts.start[:1], np.zeros_like(layouts.start[:1])
+    return LiveMotion(
+        x=x,
+        times=job.times[:count],
+        q=q,
+        qd=qd,
+        qdd=rates @ qd,
+        lost_at=None if np.isposinf(lost_at) else max(float(lost_at), 0.0),
+        is_begun=is_begun,
+    )
+
+
+def _followed(motions: Motions, times: Array) -> tuple[Array, Array, float]:
+    """Joints and speeds at the nodes up to where the tools follow, one at least, and when one is lost in [s]."""
+    lost_at = float(motions.lost_at[0])
+    count = len(times) if np.isposinf(lost_at) else max(1, int(np.searchsorted(times, lost_at)))
+    return (*(np.ascontiguousarray(part[0, :count]) for part in (motions.q, motions.qd)), lost_at)
+
+
+def _planned(block: Block, x: Array, start: Array) -> LiveMotion:
+    """The motion as the planner has it, in steps that are as coarse as its method allows."""
+    cell = _begun(block, x, start)
+    toolpaths = {name: path.toolpath for name, path in block.paths.items()}
+    try:
+        seeded, _ = with_seeds(cell, toolpaths, of_run=[robot.name for robot in cell.robots])
+        rows = plan_run(seeded, block.paths, block.stage.phase).motion
+    except (InputError, NoSolutionError) as error:
+        still, why = np.zeros_like(start[None]), str(error).splitlines()[0]
+        first = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])[None]
+        return LiveMotion(x=x, times=np.zeros(1), q=first, qd=still, qdd=still, lost_at=0.0, is_begun=False, why=why)
+    return of_rows(x, rows.times, rows.q)
+
+
+def of_rows(x: Array, times: Array, q: Array) -> LiveMotion:
+    """A motion of planned rows with times of shape (N,) in [s] and joints of shape (N, nq)."""
+    qd = np.gradient(q, times, axis=0)
+    return LiveMotion(x=x, times=times, q=q, qd=qd, qdd=np.gradient(qd, times, axis=0), is_planned=True)
+
+
+def _begun(block: Block, x: Array, start: Array) -> Cell:
+    """The cell of a block at values of the variables, its robots on the branches of a start, its steps coarser."""
+    placed, own = block.variables.placed(x), block.cell
+    start = block.variables.layouts(x[None], start[None]).start[0]
+    robots = tuple(replace(robot, start=start[placed.columns(robot.name)]) for robot in placed.robots)
+    return with_coarser_steps(replace(own, robots=robots, part=placed.part), len(block.schedule.times) - 1)
+
+
+def with_coarser_steps(cell: Cell, count: int) -> Cell:
+    """The cell on a coarser clock than one of so many steps, where its method does not depend on them."""
+    factor = next((it for it in FACTORS if count % it == 0 and count // it >= ROWS), 1)
+    if not cell.solver.is_accurate or cell.motion.finer is not None:
+        return cell
+    return replace(cell, motion=replace(cell.motion, step=factor * cell.motion.step))
