@@ -12,7 +12,7 @@ The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
 - compute: ``solve``, ``assign``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``base_map``, ``map_study``,
-  ``search_layout``, ``repair``, ``rehearse``, ``recover``
+  ``search_layout``, ``repair``, ``rehearse``, ``recover``; ``edit``: the cell live, while its layout is changed
 - verify: ``verify``, ``open_gate``
 - write: ``write_run``, ``write_assignment``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``,
   ``write_repair``, ``write_recovery``, ``export_program``, ``export_programs``; 3-D pages: ``view``, ``write_view``;
@@ -22,7 +22,7 @@ The public interface; everything else may change without notice:
   ``Axis``, ``BaseGrid``, ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``, ``ViewRequest``,
   ``FloorPlanRequest``, ``Choice``, ``Moves``
 - results: ``Solution``, ``Assignment``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``,
-  ``Screening``, ``LayoutResult``, ``Recovery``, ``Repair``, ``VerifiedRun``, ``Exported``
+  ``Screening``, ``LayoutResult``, ``Recovery``, ``Repair``, ``VerifiedRun``, ``Exported``, ``Session``
 - errors: ``CellplanError``
 
 All values are frozen data in metres, radians and seconds, with NumPy arrays; frames, pages and files are in mm, deg and
@@ -86,6 +86,7 @@ if TYPE_CHECKING:
     from cellplan.runs.solve import solve
     from cellplan.runs.verify import verify
     from cellplan.runs.write_run import write_run
+    from cellplan.session.session import Session, edit
     from cellplan.study.study import Stop
     from cellplan.study.variants import Axis
 
@@ -132,6 +133,7 @@ _PUBLIC: Final = {  # names by module
     "runs.solve": "solve",
     "runs.verify": "verify",
     "runs.write_run": "write_run",
+    "session.session": "Session edit",
     "study.study": "Stop",
     "study.variants": "Axis",
 }
@@ -141,12 +143,12 @@ _HOME: Final = {name: module for module, names in _PUBLIC.items() for name in na
 __all__ = [
     "Assignment", "AssignmentDraft", "Axis", "BaseGrid", "Candidates", "Cell", "CellplanError", "Check", "Choice",
     "CompareJob", "Exported", "FloorPlanRequest", "LayoutRequest", "LayoutResult", "MapRequest", "Motion", "Moves",
-    "Part", "Program", "Recovery", "Repair", "Report", "Robot", "Screening", "ShortestCycles", "Solution", "Stop",
-    "SweepJob", "Task", "Toolpath", "VerifiedRun", "ViewRequest", "__version__", "assign", "base_map", "compare",
-    "export_program", "export_programs", "fastest", "load_cell", "load_errors", "map_study", "open_gate", "recover",
-    "rehearse", "repair", "requested_floor_plan", "screen", "search_layout", "solve", "sweep", "tables", "to_frame",
-    "to_html", "verify", "view", "write_assignment", "write_base_map", "write_fastest", "write_floor_plan",
-    "write_recovery", "write_rehearsal", "write_repair", "write_run", "write_view",
+    "Part", "Program", "Recovery", "Repair", "Report", "Robot", "Screening", "Session", "ShortestCycles", "Solution",
+    "Stop", "SweepJob", "Task", "Toolpath", "VerifiedRun", "ViewRequest", "__version__", "assign", "base_map",
+    "compare", "edit", "export_program", "export_programs", "fastest", "load_cell", "load_errors", "map_study",
+    "open_gate", "recover", "rehearse", "repair", "requested_floor_plan", "screen", "search_layout", "solve", "sweep",
+    "tables", "to_frame", "to_html", "verify", "view", "write_assignment", "write_base_map", "write_fastest",
+    "write_floor_plan", "write_recovery", "write_rehearsal", "write_repair", "write_run", "write_view",
 ]
 # fmt: on
 

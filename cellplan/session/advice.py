@@ -16,7 +16,8 @@ from cellplan.search.programs.rows import Linear
 from cellplan.session.answer import Look
 from cellplan.session.variables import LiveVariables
 
-TRUST: Final = 2.0  # [-] usual steps of 0.1 m that an arrow is long at most
+TRUST: Final = 2.0  # [-] usual steps of 0.1 m that an arrow is long at most where something is missed
+SMALL: Final = 0.2  # [-] likewise where nothing is
 SHORTEST: Final = 1e-3  # [m] of an arrow
 ALONG: Final = 0.98  # [-] share of a step along an axis that is named by it
 AXES: Final = "xyz"
@@ -41,7 +42,7 @@ def advice(look: Look, variables: LiveVariables) -> list[Record]:
     )
     standing = standing_of(problem, motion.point(), demands, Effort(also_at=tuple(times)))
     linear = Linear.of(problem, standing.measures)
-    program = LinearProgram.of(linear, demands, Effort().reserve, TRUST)
+    program = LinearProgram.of(linear, demands, Effort().reserve, TRUST if is_missed else SMALL)
     by_variable = {key: _finite(values) for key, values in effects(standing, np.ones(len(motion.x))).items()}
     records = list[Record]()
     for robot, base in enumerate(look.block.cell.robots):

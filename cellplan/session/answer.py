@@ -67,9 +67,9 @@ class Look:
         known, motion = self.judgement, self.motion
         if known is not None and known.lost:
             return known.lost
-        if known is None and not motion.is_followed:
-            where = "no tool loses its path" if not motion.is_begun else f"a tool loses its path at {motion.lost_at:.3f} s"
-            return motion.why or ("the start of a path is out of reach" if not motion.is_begun else where)
+        if known is None and motion.lost_at is not None:
+            lost = f"a tool loses its path at {motion.lost_at:.3f} s"
+            return motion.why or (lost if motion.is_begun else "the start of a path is out of reach")
         if known is not None and known.lines:
             more = f" (and {len(known.lines) - 1} more)" if len(known.lines) > 1 else ""
             return f"{known.lines[0]}{more}"

@@ -13,12 +13,14 @@ from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.task.clocked_path import ClockedPath
-from cellplan.planning.modes import plan_phases, standing
+from cellplan.planning.modes import homeless, plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.sequence.stages import Stage, program_stages
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.runs.plan.given_starts import with_chosen_start, with_placed_starts
+from cellplan.runs.plan.homes import find_homes, with_homes
+from cellplan.runs.plan.run import plan_run
 from cellplan.runs.plan.sequence import plan_work
 from cellplan.runs.plan.start import chosen_start
 from cellplan.scene.scene import Scene
@@ -89,7 +91,7 @@ class LiveCell:
         bodies = CellDistances.of(scene, variables.layout)
         if self.phases is not None:
             phases = ProgramPhases.of_work(self.phases.work, variables.layout, bodies)
-            blocks = tuple(replace(it, start=old.start) for it, old in zip(_of_program(phases), self.blocks, strict=True))
+            blocks = tuple(_of_program(phases))
             return replace(self, cell=cell, variables=variables, scene=scene, phases=phases, blocks=blocks)
         blocks = tuple(_in_place(it, bodies, variables) for it in self.blocks)
         return replace(self, cell=cell, variables=variables, scene=scene, blocks=blocks)
@@ -109,15 +111,17 @@ def _started(scene: Scene) -> Cell:
     paths = clock_paths(cell, toolpaths.values())
     placed, _ = with_placed_starts(cell, toolpaths, scene.chains, drops_far=True)
     start = chosen_start(replace(scene, cell=placed), paths).start
-    return with_chosen_start(placed, start, toolpaths)[0]
+    started = with_chosen_start(placed, start, toolpaths)[0]
+    phases = plan_phases(started).program
+    if not any(homeless(started, phase) for phase in phases):
+        return started
+    planned = [plan_run(started, paths, phase) for phase in phases]
+    return with_homes(started, find_homes(replace(scene, cell=started), planned), given=placed)
 
 
 def _mid_range(cell: Cell) -> Cell:
     """The cell with robots without a start at their homes, or mid-range."""
-    robots = [
-        robot if robot.start is not None else replace(robot, start=_somewhere(robot))
-        for robot in cell.robots
-    ]
+    robots = [robot if robot.start is not None else replace(robot, start=_somewhere(robot)) for robot in cell.robots]
     return replace(cell, robots=tuple(robots))
 
 

@@ -1,6 +1,7 @@
 """Engine of a session: the values of a live cell, the block that is shown, and what is known of all blocks."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from cellplan.errors import InputError
 from cellplan.jobs.view.cell_scene import standing_scene
@@ -25,15 +26,16 @@ class Engine:
         given: The cell as it was read.
         values: Values in file units by address; those of the file where there is none.
         shown: Number of the block that is shown.
-        is_settled: Whether all is known that is asked at rest.
+        version: How often the values were set.
     """
 
-    def __init__(self, cell: Cell, shown: int = 0) -> None:
+    def __init__(self, cell: Cell, shown: int = 0, version: int = 0) -> None:
         """Plan the layout of a cell."""
         self.given = self._live = LiveCell.of(cell)
-        self.shown = min(shown, len(self.given.blocks) - 1)
+        works = [place for place, block in enumerate(self.given.blocks) if block.stage.move is None]
+        self.shown = shown if 0 < shown < len(self.given.blocks) else works[0]
         self._bodies = {body.name: body.X_BS for body in self.given.scene.bodies}
-        self._obstacles = dict[str, float]()
+        self._obstacles, self.version = dict[str, float](), version
         self._looks = dict[int, Look]()
         self.move({})
 
@@ -47,10 +49,16 @@ class Engine:
             raise InputError(f"block: expected a number below {len(self.given.blocks)}, got {block}")
         self._place_obstacles({it: value for it, value in values.items() if self.given.variables.is_of_obstacle(it)})
         self.shown, self.values = self.shown if block is None else block, {**values}
-        self._advice, self.is_settled = list[Record](), False
+        self.version, self._advice, self._is_settled = self.version + 1, list[Record](), False
+        self._pending: Iterator[None] | None = None  # what is still to be found out at rest
         self._x = self._live.variables.numbers(values)
         last, shown = self._looks.get(self.shown), self._live.blocks[self.shown]
         self._looks = {self.shown: Look.at(shown, follow(shown, self._x, None if last is None else last.motion))}
+
+    def restore(self, values: Mapping[str, object]) -> None:
+        """Look at the shown block at values of a document, of which those of variables count."""
+        known = {variable.address for variable in self.given.variables.listed}
+        self.move({address: float(str(value)) for address, value in values.items() if address in known})
 
     def variable(self, address: str) -> Variable:
         """The variable at an address.
@@ -72,14 +80,20 @@ class Engine:
         is_given = all(self.values.get(it.address, it.given) == it.given for it in listed)
         return as_given(cell, written) if is_given else written
 
-    def settle(self, cell: Cell) -> Iterator[None]:
-        """Find out all that is asked at rest, piece by piece: the shown block, the others, what would help.
+    def settle(self, cell: Cell) -> bool:
+        """Find out more of what is asked at rest, a bounded piece of work; False once there is nothing left to do.
 
         Args:
             cell: The cell as it would be saved.
         """
+        if self._pending is None:
+            self._pending = self._settling(cell)
+        return next(self._pending, True) is None
+
+    def _settling(self, cell: Cell) -> Iterator[None]:
+        """Piece by piece: the shown block, the others, what would help."""
         look = self._looks[self.shown]
-        for judgement in judged(cell, look.block, self.given.scene):
+        for judgement in judged(self._begun(cell, look), look.block, self.given.scene):
             if not look.motion.is_followed and len(judgement.q):
                 look = Look.at(look.block, of_rows(self._x, judgement.times, judgement.q))
             look = self._looks[self.shown] = look.judged(judgement)
@@ -88,21 +102,22 @@ class Engine:
             if place not in self._looks:
                 self._looks[place] = Look.at(block, follow(block, self._x))
                 yield None
-        self._advice = advice(look, self._live)
-        self.is_settled = True
+        self._advice = advice(look, self._live.variables)
+        self._is_settled = True
         yield None
 
     def record(self) -> Record:
         """What is known of the present values."""
         listed = self.given.variables.listed
         return {
+            "version": self.version,
             "values": {it.address: self.values.get(it.address, it.given) for it in listed},
             "block": self.shown,
             **self._looks[self.shown].record,
             "poses": poses(self._live.variables.layout.placed(self._x), self._bodies),
             "strip": strip_of(self._live.blocks, self._looks),
             "advice": self._advice,
-            "is_settled": self.is_settled,
+            "is_settled": self._is_settled,
         }
 
     def page(self) -> Record:
@@ -111,12 +126,22 @@ class Engine:
         shown = {**standing_scene(scene, geometries), "bases": base_records(scene.cell)}
         return {
             "view": page_record("cell", scene.cell, geometries, [shown]),
-            "variables": [
-                it.record(value=self.values.get(it.address, it.given)) for it in self.given.variables.listed
-            ],
+            "variables": [it.record(value=self.values.get(it.address, it.given)) for it in self.given.variables.listed],
             "blocks": [{"name": block.name, "tasks": list(block.tasks)} for block in self.given.blocks],
             "demands": {"clearance_mm": scene.cell.checks.clearance_mm},
         }
+
+    def _begun(self, cell: Cell, look: Look) -> Cell:
+        """A cell with starts that are to be found where the live motion begins."""
+        if not look.motion.is_begun or cell.program.is_home_to_home:
+            return cell
+        starts = {robot.name: look.motion.q[0, cell.columns(robot.name)] for robot in cell.robots}
+        working = {*cell.positioners, *(task.robot for task in cell.tasks)}
+        robots = (
+            replace(robot, start=starts[robot.name]) if robot.start is None and robot.name in working else robot
+            for robot in cell.robots
+        )
+        return replace(cell, robots=tuple(robots))
 
     def _place_obstacles(self, values: Mapping[str, float]) -> None:
         """Let obstacles stand where values of theirs say, by address."""

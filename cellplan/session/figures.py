@@ -1,12 +1,12 @@
 """Figures of a live motion: what each is, its limit, whether it is kept, and what binds at which time."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell, Timing, joint_at
 from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.units import DEG, MM

@@ -5,7 +5,7 @@ the certificate holds at all times between rows. So the verdict is that of ``sol
 path at every row, is beside it between two of them: some micrometres.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -23,16 +23,17 @@ from cellplan.jobs.view.write import placed_scene
 from cellplan.model.cell.cell import Cell, stacked_positions
 from cellplan.model.motion.motion import JointTable, Schedule
 from cellplan.model.progress import silent
+from cellplan.model.report.check_kinds import CHECK_KINDS
 from cellplan.model.report.report import Report
+from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.sequence.stages import program_stages
+from cellplan.planning.sequence.stages import Stage, program_stages
 from cellplan.planning.timing.schedule import clock_paths
-from cellplan.runs.greatest_feeds import open_feeds
 from cellplan.runs.plan.run import plan_run
 from cellplan.runs.solve import solve_motion
 from cellplan.scene.scene import Scene
 from cellplan.session.blocks import Block
-from cellplan.session.motion import with_coarser_steps
+from cellplan.session.motion import coarser
 
 ROWS_AT_ONCE: Final = 250  # [-] of which the certificate is asked in one piece
 NEAR: Final = 0.05  # [m] within which the pair is looked for that a failed certificate is about
@@ -57,32 +58,31 @@ class Judgement:
 
 
 def judged(cell: Cell, block: Block, first: Scene) -> Iterator[Judgement]:
-    """What is known of a block, more from piece to piece.
+    """What is known of a block, more from piece to piece; nothing of the straight moves that grip or put down a part.
 
     Args:
         cell: The cell as it would be saved.
         block: The block of the live cell that is shown.
         first: The scene of the given layout.
     """
+    if block.stage.move is not None:
+        return
     try:
-        phases = _of_program(cell, block, first) if cell.program.is_home_to_home else _of_cell(cell, block)
+        phase = _planned(cell, block, first)
     except (InputError, NoSolutionError) as error:
         yield Judgement(is_done=True, lost=str(error).splitlines()[0])
         return
-    shown = next((it for it in phases if it.report.phase in (None, block.name)), phases[0])
-    q = stacked_positions(cell, shown.report.q)
-    known = Judgement(report=shown.report, times=shown.schedule.times, q=q, lines=_failed([shown.report]))
+    q = stacked_positions(cell, phase.report.q)
+    known = Judgement(report=phase.report, times=phase.schedule.times, q=q, lines=_failed([phase.report]))
     yield known
-    is_clear, lines = True, list[str]()
-    for phase in phases:
-        for line in _unclear(phase.scene, phase.schedule, stacked_positions(cell, phase.report.q)):
-            if line:
-                is_clear = False
-                lines.append(line)
-                break
-            yield known
-    reports = with_task_rules(cell, phases, [phase.report for phase in phases])
-    yield replace(known, is_done=True, is_clear=is_clear, lines=(*_failed(reports), *lines))
+    unclear = ""
+    for unclear in _unclear(phase.scene, phase.schedule, q):
+        if unclear:
+            break
+        yield known
+    reports = with_task_rules(cell, [phase], [phase.report]) if _is_single(cell) else [phase.report]
+    lines = (*_failed(reports), *([unclear] if unclear else ()))
+    yield replace(known, is_done=True, is_clear=not unclear, lines=lines)
 
 
 def _failed(reports: Sequence[Report]) -> tuple[str, ...]:
@@ -90,23 +90,40 @@ def _failed(reports: Sequence[Report]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(check.message for report in reports for check in report.checks if not check.passed))
 
 
-def _of_cell(cell: Cell, block: Block) -> list[JudgedPhase]:
-    """The phases of a cell without a program, as ``solve`` has them, all but their clearance."""
-    if not open_feeds(cell):  # these are sought in the file
-        cell = with_coarser_steps(cell, len(block.schedule.times) - 1)
-    _, solution = solve_motion(cell, task=None, progress=silent)
-    return [_with_depths(run.scene, run.schedule, run.report) for run in solution.runs]
+def _planned(cell: Cell, block: Block, first: Scene) -> JudgedPhase:
+    """The shown block on a coarser clock; on that of the cell where only the time between two rows makes it fail."""
+    for factor in dict.fromkeys((coarser(cell, len(block.schedule.times) - 1), 1)):
+        phase = _of_cell(cell, factor) if _is_single(cell) else _of_block(cell, block, first, factor)
+        failed = [check.name for check in phase.report.checks if not check.passed]
+        if not failed or not all(CHECK_KINDS[name].shrinks_with_step for name in failed):
+            break
+    return phase
 
 
-def _of_program(cell: Cell, block: Block, first: Scene) -> list[JudgedPhase]:
-    """The block of a program that is shown, from the starts of the cell; straight moves are as they were planned."""
-    stages = [stage for stage in program_stages(cell) if stage.phase.name == block.name]
-    stage = stages[0]
+def _is_single(cell: Cell) -> bool:
+    """Whether the whole job is one block, which is then judged as ``solve`` has it."""
+    return not cell.program.is_home_to_home and len(plan_phases(cell).program) == 1
+
+
+def _of_cell(cell: Cell, factor: int) -> JudgedPhase:
+    """The only phase of a cell, all but its clearance."""
+    motion = replace(cell.motion, step=factor * cell.motion.step)
+    _, solution = solve_motion(replace(cell, motion=motion) if factor > 1 else cell, task=None, progress=silent)
+    run = solution.runs[0]
+    return _with_depths(run.scene, run.schedule, run.report)
+
+
+def _of_block(cell: Cell, block: Block, first: Scene, factor: int) -> JudgedPhase:
+    """One of several blocks, from the starts of the cell; what is idle stands where it does in the given layout."""
+    stages = program_stages(cell) or [Stage(phase=it, cell=cell) for it in plan_phases(cell).program]
+    stage = next(it for it in stages if it.phase.name == block.name)
+    moving, idle = stage.phase.moving, stage.phase.idle
     robots = [
-        replace(robot, start=known.start) if robot.start is None or robot.name in stage.phase.idle else robot
+        replace(robot, start=known.start, home=known.home) if robot.start is None or robot.name in idle else robot
         for robot, known in zip(stage.cell.robots, block.cell.robots, strict=True)
     ]
-    own = with_coarser_steps(replace(stage.cell, robots=tuple(robots)), len(block.schedule.times) - 1)
+    motion = replace(stage.cell.motion, step=factor * stage.cell.motion.step)
+    own = replace(stage.cell, robots=tuple(robots), motion=motion)
     paths = clock_paths(own, [build_toolpath(task, own.part) for task in own.tasks])
     planned = plan_run(own, paths, stage.phase)
     scene = replace(placed_scene(first, own), cell=own)
@@ -119,9 +136,8 @@ def _of_program(cell: Cell, block: Block, first: Scene) -> list[JudgedPhase]:
         )
         for robot in own.robots
     ]
-    moving, idle = stage.phase.moving, stage.phase.idle
     report = verify_motion(scene, planned.schedule, tables, moving=moving, idle=idle)
-    return [_with_depths(scene, planned.schedule, replace(report, phase=block.name))]
+    return _with_depths(scene, planned.schedule, replace(report, phase=block.name))
 
 
 def _with_depths(scene: Scene, schedule: Schedule, report: Report) -> JudgedPhase:

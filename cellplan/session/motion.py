@@ -9,13 +9,14 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell.cell import Cell
 from cellplan.planning.start.seeds import with_seeds
+from cellplan.runs.greatest_feeds import open_feeds
 from cellplan.runs.plan.run import plan_run
 from cellplan.search.kernel.run import Motions, run, run_near
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.problem import Point
 from cellplan.session.blocks import Block
 
-ROWS: Final = 1000  # [-] of a motion that is planned while it is looked at, where the steps of its cell are finer
+ROWS: Final = 400  # [-] of a motion that is planned while it is looked at, where the steps of its cell are finer
 APART: Final = 1e-6  # [rad] or [m] between two starts that are the same
 FACTORS: Final = (50, 40, 25, 20, 16, 10, 8, 5, 4, 2)  # [-] times as long steps, the longest first
 
@@ -92,7 +93,8 @@ def _followed(motions: Motions, times: Array) -> tuple[Array, Array, float]:
     """Joints and speeds at the nodes up to where the tools follow, one at least, and when one is lost in [s]."""
     lost_at = float(motions.lost_at[0])
     count = len(times) if np.isposinf(lost_at) else max(1, int(np.searchsorted(times, lost_at)))
-    return (*(np.ascontiguousarray(part[0, :count]) for part in (motions.q, motions.qd)), lost_at)
+    q, qd = (np.ascontiguousarray(part[0, :count]) for part in (motions.q, motions.qd))
+    return q, qd, lost_at
 
 
 def _planned(block: Block, x: Array, start: Array) -> LiveMotion:
@@ -101,12 +103,20 @@ def _planned(block: Block, x: Array, start: Array) -> LiveMotion:
     toolpaths = {name: path.toolpath for name, path in block.paths.items()}
     try:
         seeded, _ = with_seeds(cell, toolpaths, of_run=[robot.name for robot in cell.robots])
+    except NoSolutionError:
+        return _at_start(x, cell, "the start of a path is out of reach on the branch of the start")
+    try:
         rows = plan_run(seeded, block.paths, block.stage.phase).motion
     except (InputError, NoSolutionError) as error:
-        still, why = np.zeros_like(start[None]), str(error).splitlines()[0]
-        first = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])[None]
-        return LiveMotion(x=x, times=np.zeros(1), q=first, qd=still, qdd=still, lost_at=0.0, is_begun=False, why=why)
+        return _at_start(x, cell, str(error).splitlines()[0])
     return of_rows(x, rows.times, rows.q)
+
+
+def _at_start(x: Array, cell: Cell, why: str) -> LiveMotion:
+    """All robots where a cell begins, as there is no motion."""
+    q = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])[None]
+    still = np.zeros_like(q)
+    return LiveMotion(x=x, times=np.zeros(1), q=q, qd=still, qdd=still, lost_at=0.0, is_begun=False, why=why)
 
 
 def of_rows(x: Array, times: Array, q: Array) -> LiveMotion:
@@ -120,12 +130,12 @@ def _begun(block: Block, x: Array, start: Array) -> Cell:
     placed, own = block.variables.placed(x), block.cell
     start = block.variables.layouts(x[None], start[None]).start[0]
     robots = tuple(replace(robot, start=start[placed.columns(robot.name)]) for robot in placed.robots)
-    return with_coarser_steps(replace(own, robots=robots, part=placed.part), len(block.schedule.times) - 1)
+    step = coarser(own, len(block.schedule.times) - 1) * own.motion.step
+    return replace(own, robots=robots, part=placed.part, motion=replace(own.motion, step=step))
 
 
-def with_coarser_steps(cell: Cell, count: int) -> Cell:
-    """The cell on a coarser clock than one of so many steps, where its method does not depend on them."""
-    factor = next((it for it in FACTORS if count % it == 0 and count // it >= ROWS), 1)
-    if not cell.solver.is_accurate or cell.motion.finer is not None:
-        return cell
-    return replace(cell, motion=replace(cell.motion, step=factor * cell.motion.step))
+def coarser(cell: Cell, count: int) -> int:
+    """How many times as long steps a motion of so many is looked at in: 1 where its method depends on them."""
+    if not cell.solver.is_accurate or cell.motion.finer is not None or open_feeds(cell):
+        return 1
+    return next((factor for factor in FACTORS if count % factor == 0 and count // factor >= ROWS), 1)

@@ -1,6 +1,6 @@
 """Session: a cell that is changed while it is looked at; each change is answered with what becomes of the whole job."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
@@ -14,33 +14,43 @@ from cellplan.session.engine import Engine
 SCHEMA: Final = "cellplan.edit/1"
 
 
+def edit(cell: Path | str, *, settings: Iterable[str] = (), allow_dirs: Sequence[Path] = ()) -> "Session":
+    """Open a cell file to change its layout while what becomes of the whole job is looked at.
+
+    Args:
+        cell: The file; nothing is written into it but by ``do("save")``.
+        settings: Values set in the cell from the beginning, each as ``KEY=VALUE``.
+        allow_dirs: Further folders that the files it names may lie in.
+
+    Returns:
+        The session, also for a ``with`` statement.
+
+    Raises:
+        InputError: The cell cannot be read, or not be worked with.
+    """
+    return Session.open(Path(cell), settings=settings, allow_dirs=allow_dirs)
+
+
 class Session:
-    """A cell file that is open; ``cellplan.edit`` opens one. It is called from one thread, and starts none."""
+    """A cell file that is open. It is called from one thread, and starts none.
+
+    Attributes:
+        document: The file, what was changed of it, and the cell with that.
+    """
 
     def __init__(self, document: Document) -> None:
         """Use ``open``."""
-        self._document, self._engine = document, Engine(document.given)
-        self._version = self._number = 0
-        self._pending: Iterator[None] | None = None  # what is still to be found out at rest
+        self.document, self._engine, self._number = document, Engine(document.given), 0
         self._certified: Mapping[str, object] | None = None  # values of the last certified state
 
     @classmethod
-    def open(cls, cell: Path | str, *, settings: Iterable[str] = (), allow_dirs: Sequence[Path] = ()) -> Self:
-        """Open a cell file.
-
-        Args:
-            cell: The file.
-            settings: Values set in the cell from the beginning, each as ``KEY=VALUE``.
-            allow_dirs: Further folders that the files it names may lie in.
-
-        Raises:
-            InputError: The cell cannot be read, or not be worked with.
-        """
-        return cls(Document(Path(cell), settings, allow_dirs))
+    def open(cls, cell: Path, *, settings: Iterable[str] = (), allow_dirs: Sequence[Path] = ()) -> Self:
+        """Open a cell file; see ``edit``."""
+        return cls(Document(cell, settings, allow_dirs))
 
     def open_record(self) -> Record:
         """What a page needs once."""
-        name, file = self._document.cell.name, self._document.path.name
+        name, file = self.document.cell.name, self.document.path.name
         return {"schema": SCHEMA, "cell": name, "file": file, **self._engine.page(), "answer": self.answer()}
 
     def change(self, values: Mapping[str, float], *, block: int | None = None, number: int = 0) -> Record:
@@ -57,9 +67,9 @@ class Session:
         engine = self._engine
         accepted = {address: engine.variable(address).accepted(float(value)) for address, value in values.items()}
         self._number = number
-        self._look({**engine.values, **accepted}, block)
+        engine.move({**engine.values, **accepted}, block)
         if accepted:
-            self._document.changes.set({**accepted, **engine.starts()})
+            self.document.changes.set({**accepted, **engine.starts()})
         return self.answer()
 
     def move(self, robot: str, **components: float) -> Record:
@@ -68,20 +78,16 @@ class Session:
 
     def settle(self) -> Record | None:
         """A fuller answer, a bounded piece of work at a time; None once there is nothing left to do."""
-        if self._pending is None:
-            self._document.changes.complete()
-            self._pending = self._engine.settle(self._document.cell)
-        for _ in self._pending:
-            return self.answer()
-        return None
+        self.document.changes.complete()
+        return self.answer() if self._engine.settle(self.document.cell) else None
 
-    def do(self, action: str, argument: float | None = None) -> Record:
+    def do(self, action: str, argument: float | None = None) -> Record:  # noqa: ARG002
         """Do something else than a change, and say what becomes of the block that is shown.
 
         Raises:
             InputError: There is no such action, or it is refused.
         """
-        changes, document = self._document.changes, self._document
+        changes, document = self.document.changes, self.document
         actions: dict[str, Callable[[], Any]] = {
             "undo": changes.undo,
             "redo": changes.redo,
@@ -95,30 +101,29 @@ class Session:
             raise InputError(f"action: expected one of {', '.join(actions)}, got '{action}'")
         actions[action]()
         if action in {"save", "reload", "keep"}:
-            self._engine = Engine(document.given, self._engine.shown)
-        self._look(self._numbers(), None)
+            self._engine = Engine(document.given, self._engine.shown, self._engine.version)
+        self._engine.restore(document.changes.values)
         return self.answer()
 
     def poll(self) -> list[Record]:
         """What has happened in the background since it was asked last; it never waits."""
-        event = self._document.look()
+        event = self.document.look()
         if event is None:
             return []
         if event["state"] != "changed":
             return [event]
-        self._engine = Engine(self._document.given, self._engine.shown)
-        self._look(self._numbers(), None)
+        self._engine = Engine(self.document.given, self._engine.shown, self._engine.version)
+        self._engine.restore(self.document.changes.values)
         return [event, {"event": "answer", "answer": self.answer()}]
 
     def answer(self) -> Record:
         """What is known of the present values."""
-        document, record = self._document, self._engine.record()
+        document, record = self.document, self._engine.record()
         if record["state"] == PLANNED and self._certified == document.changes.values:
-            record |= {"state": CERTIFIED, "verdict": f"{CERTIFIED}: every check passed"}
+            record = {**record, "state": CERTIFIED, "verdict": f"{CERTIFIED}: every check passed"}
         can = {"undo": document.changes.can_undo, "redo": document.changes.can_redo, "save": bool(document.history)}
         return {
             "number": self._number,
-            "version": self._version,
             **record,
             "can": can,
             "history": document.history,
@@ -137,14 +142,3 @@ class Session:
     ) -> None:
         """See ``close``."""
         self.close()
-
-    def _look(self, values: Mapping[str, float], block: int | None) -> None:
-        """Look at a block at other values."""
-        self._engine.move(values, block)
-        self._version, self._pending = self._version + 1, None
-
-    def _numbers(self) -> dict[str, float]:
-        """The values of the document that are variables."""
-        values = self._document.changes.values
-        known = {variable.address for variable in self._engine.given.variables.listed}
-        return {address: float(str(value)) for address, value in values.items() if address in known}

@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell.cell import Cell, Robot
-from cellplan.model.cell.layout import VariableKind, VaryRange
+from cellplan.model.cell.layout import LayoutSettings, VariableKind, VaryRange
 from cellplan.model.robot.robot import start_keys
 from cellplan.model.units import DEG, MM
 from cellplan.search.variables.pedestals import leaving_columns
@@ -42,7 +42,8 @@ class LiveVariables:
         """Those of a cell that was read from a file."""
         state = State.given(cell)
         ranges = [it for it in _ranges(cell) if np.isfinite(state.numbers(cell, [it])[0])]
-        ranges = [replace(it, given=float(value)) for it, value in zip(ranges, state.numbers(cell, ranges), strict=True)]
+        numbers = state.numbers(cell, ranges).tolist()
+        ranges = [replace(it, given=number) for it, number in zip(ranges, numbers, strict=True)]
         stated = {} if cell.layout is None or cell.layout.is_default else {it.address: it for it in cell.layout.ranges}
         bounded = leaving_columns(cell, [_bounded(cell, it, stated) for it in ranges])
         listed = [_listed(cell, it, is_varied=it.address in stated) for it in bounded]
@@ -71,9 +72,7 @@ class LiveVariables:
 
 def _layout_variables(cell: Cell, ranges: Sequence[VaryRange]) -> Variables:
     """The variables of a search; obstacles below bases stay obstacles, unlike those of a search."""
-    settings = replace(
-        cell.layout, ranges=tuple(ranges), paths=(), choices=(), equal=(), mirrored=(), keep_out=(), cost={}
-    )  # type: ignore[type-var] # a cell from a file has a layout
+    settings = LayoutSettings(ranges=tuple(ranges))
     tied = Tied.of(settings)
     return Variables(
         base=cell,

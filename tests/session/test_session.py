@@ -1,0 +1,198 @@
+"""A live cell: its answers beside plain solves and maps, what it refuses, undo, and that equal changes answer equally."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cellplan import edit, load_cell, solve
+from cellplan.errors import InputError
+from cellplan.session.blocks import LiveCell
+from cellplan.session.figures import Loads, joint_figures
+from cellplan.session.motion import follow
+from cellplan.session.session import Session
+
+CELLS = Path(__file__).resolve().parents[2] / "cells"
+PAIR = CELLS / "planar_pair.yaml"
+SETTINGS = ("robots.left.start_deg=[50, -85, 35]", "motion.step_s=0.01", "solver.integrator=accurate")
+
+
+def settled(session: Session) -> Any:
+    """The last answer at rest."""
+    answer = session.answer()
+    while (more := session.settle()) is not None:
+        answer = more
+    return answer
+
+
+@pytest.fixture(scope="module")
+def pair() -> Session:
+    return edit(PAIR, settings=SETTINGS)
+
+
+@pytest.fixture(autouse=True)
+def _as_given(request: pytest.FixtureRequest) -> None:
+    if "pair" in request.fixturenames:
+        request.getfixturevalue("pair").do("reset")
+
+
+def figure(answer: Any, name: str) -> Any:
+    return next(it for it in answer["figures"] if it["name"] == name)
+
+
+def test_record_of_a_page_is_plain_json(pair: Session) -> None:
+    record = json.loads(json.dumps(pair.open_record(), allow_nan=False))
+
+    assert record["schema"] == "cellplan.edit/1"
+    assert record["file"] == "planar_pair.yaml"
+    assert {it["kind"] for it in record["variables"]} >= {"base_x", "base_yaw", "part_x", "start"}
+    assert record["view"]["kind"] == "cell"
+    assert len(record["view"]["scenes"]) == 1
+
+
+def test_settled_answer_has_the_figures_of_the_report(pair: Session) -> None:
+    pair.move("right", x_mm=1830)
+    answer = settled(pair)
+
+    settings = [it.removeprefix("--set ").strip("'") for it in answer["history"]]
+    values = dict(it.split("=", 1) for it in settings)
+    cell = load_cell(PAIR).with_values({key: json.loads(v) if v[0] in "[-0123456789" else v for key, v in values.items()})
+    report = solve(cell).runs[0].report
+    tightest = min(report.joints, key=lambda use: use.margin)
+    fastest = max(use.peak_velocity / use.velocity_limit for use in report.joints)
+    assert answer["is_settled"]
+    assert answer["state"] == ("planned" if report.passed else "fails")
+    assert figure(answer, "margin")["value"] == pytest.approx(np.degrees(tightest.margin), abs=0.05)
+    assert figure(answer, "velocity")["value"] == pytest.approx(100.0 * fastest, rel=0.01)
+
+
+def test_same_changes_give_the_same_answers(pair: Session) -> None:
+    def answered() -> str:
+        pair.do("reset")
+        for step in range(3):
+            pair.move("right", x_mm=1800 + 20 * step, y_mm=10 * step)
+        answer = pair.answer()
+        return json.dumps([answer["figures"], answer["values"], answer["history"], answer["verdict"]])
+
+    assert answered() == answered()
+
+
+def test_way_to_a_layout_does_not_matter(pair: Session) -> None:
+    pair.move("right", x_mm=1850)
+    direct = pair.answer()
+    pair.do("reset")
+    for x in (1700, 1750, 1900, 1850):
+        pair.move("right", x_mm=x)
+
+    assert pair.answer()["figures"] == direct["figures"]
+
+
+def test_tool_that_loses_its_path_says_when(pair: Session) -> None:
+    answer = pair.move("right", x_mm=3300)
+
+    assert answer["state"] == "breaks off"
+    assert answer["lost_at"] == pytest.approx(0.0, abs=12.0)
+    assert "path" in answer["verdict"]
+    assert settled(pair)["state"] == "breaks off"
+
+
+def test_undone_step_brings_the_answer_back(pair: Session) -> None:
+    before = pair.answer()
+    pair.move("right", x_mm=1850)
+    pair.settle()  # the drag has ended
+    pair.move("right", y_mm=30)
+
+    pair.do("undo")
+    assert pair.answer()["values"]["robots.right.base.x_mm"] == 1850
+    answer = pair.do("undo")
+    assert answer["figures"] == before["figures"]
+    assert answer["history"] == before["history"]
+    assert pair.do("redo")["values"]["robots.right.base.x_mm"] == 1850
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"motion.duration_s": 1.0}, "motion.duration_s: expected the address of a number that may be changed"),
+        ({"robots.right.base.x_mm": float("nan")}, "robots.right.base.x_mm: expected a number from"),
+        ({"robots.right.base.x_mm": 1e9}, "robots.right.base.x_mm: expected a number from"),
+    ],
+)
+def test_other_values_are_refused_and_change_nothing(pair: Session, values: Any, message: str) -> None:
+    before = pair.answer()
+
+    with pytest.raises(InputError, match=message):
+        pair.change(values)
+    assert pair.answer() == before
+
+
+def test_fixed_station_is_locked() -> None:
+    layout = "layout={vary: {right.base: {x_mm: [1500, 2100]}, left.base: {x_mm: [-10, 10]}}, fixed: [left.base]}"
+    session = edit(PAIR, settings=(*SETTINGS, layout))
+
+    with pytest.raises(InputError, match=r"robots.left.base.x_mm: is locked by layout.fixed"):
+        session.move("left", x_mm=1)
+    right = next(it for it in session.open_record()["variables"] if it["address"] == "robots.right.base.x_mm")
+    assert (right["lower"], right["upper"], right["is_varied"]) == (1500, 2100, True)
+
+
+@pytest.mark.slow
+def test_base_that_is_moved_and_the_world_with_it_changes_no_figure() -> None:
+    cell = load_cell(CELLS / "fixed_part.yaml")
+    live = LiveCell.of(cell)
+    x = live.variables.layout.given.copy()
+    block = live.blocks[0]
+    before = follow(block, x)
+    for place, variable in enumerate(live.variables.layout.tied.ranges):
+        if variable.address.endswith((".base.x_mm", "part.at.x_mm")):
+            x[place] += 0.2
+    after = follow(block, x)
+
+    assert np.abs(after.q - before.q).max() < 1e-6
+
+
+@pytest.mark.slow
+def test_live_figures_are_those_of_the_planner() -> None:
+    live = LiveCell.of(load_cell(CELLS / "two_robots.yaml"))
+    block = live.blocks[0]
+    x = live.variables.layout.given
+    run = solve(load_cell(CELLS / "two_robots.yaml")).runs[0]
+    motion = follow(block, x)
+
+    figures = {it.name: it for it in joint_figures(block.cell, motion, Loads.of(block.cell, motion))}
+    margin = min(use.margin for use in run.report.joints)
+    assert figures["margin"].value == pytest.approx(np.degrees(margin), abs=0.1)
+    assert figures["velocity"].value == pytest.approx(
+        100.0 * max(use.peak_velocity / use.velocity_limit for use in run.report.joints), rel=0.005
+    )
+
+
+@pytest.mark.slow
+def test_arrow_tells_what_a_step_does() -> None:
+    session = edit(CELLS / "four_robots_initial.yaml")
+    answer = settled(session)
+    arrow = max(answer["advice"], key=lambda it: it["step_mm"])
+    name = session.open_record()["view"]["scenes"][0]["robots"][arrow["robot"]]["name"]
+    step = 1.0  # [mm], small enough for the derivative
+    said = float(arrow["text"].split(": ")[1].split(" deg")[0]) / arrow["step_mm"]
+
+    values = {
+        f"{axis}_mm": answer["values"][f"robots.{name}.base.{axis}_mm"] + step * part
+        for axis, part in zip("xyz", arrow["direction"], strict=True)
+    }
+    moved = session.move(name, **values)
+    before = next(it for it in session.do("undo")["figures"] if it["name"] == "margin")["value"]
+    assert figure(moved, "margin")["value"] - before == pytest.approx(said, rel=0.05)
+
+
+@pytest.mark.slow
+def test_program_shows_all_blocks() -> None:
+    session = edit(CELLS / "in_turn.yaml")
+    assert [it["state"] for it in session.answer()["strip"]] == ["planned", "unknown", "unknown"]
+
+    answer = settled(session)
+    assert [it["state"] for it in answer["strip"]] == ["planned"] * 3
+    answer = session.change({}, block=2)
+    assert answer["block"] == 2
