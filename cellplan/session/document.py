@@ -79,6 +79,11 @@ class Document:
         return self._built[1]
 
     @property
+    def given(self) -> Cell:
+        """The cell as it was last read, with the settings of the session."""
+        return self._read.cell
+
+    @property
     def history(self) -> list[str]:
         """What differs from the file, as options of commands that read it; empty where all is saved."""
         return [f"--set {quote(setting)}" for setting in self.settings]
