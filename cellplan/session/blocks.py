@@ -99,9 +99,9 @@ class LiveCell:
 
 def _in_place(block: Block, bodies: CellDistances, variables: LiveVariables) -> Block:
     """A block with other bodies."""
-    own = replace(block.variables, whole=variables.layout)
-    problem = None if block.problem is None else replace(block.problem, bodies=bodies, variables=own)
-    return replace(block, bodies=bodies, variables=own, problem=problem)
+    varied = replace(block.variables, whole=variables.layout)
+    problem = None if block.problem is None else replace(block.problem, bodies=bodies, variables=varied)
+    return replace(block, bodies=bodies, variables=varied, problem=problem)
 
 
 def _started(scene: Scene) -> Cell:
@@ -132,18 +132,18 @@ def _block(stage: Stage, bodies: CellDistances, variables: LiveVariables) -> Blo
     paths = clock_paths(cell, toolpaths)
     schedule = schedule_paths(cell, [paths[name] for name in phase.tasks])
     start = standing(cell, phase, np.concatenate([robot.start for robot in cell.robots if robot.start is not None]))
-    own = PhaseVariables(whole=variables.layout, begins_there=True, tasks=tuple(phase.tasks))
+    varied = PhaseVariables(whole=variables.layout, begins_there=True, tasks=tuple(phase.tasks))
     problem = None
     if is_for_kernel(cell):
         job = _job(cell, schedule, phase.moving, start)
-        problem = LayoutProblem(job=job, variables=own, bodies=bodies, acceleration=acceleration_limits(cell))
+        problem = LayoutProblem(job=job, variables=varied, bodies=bodies, acceleration=acceleration_limits(cell))
     return Block(
         name=phase.name,
         stage=stage,
         start=start,
         paths=paths,
         schedule=schedule,
-        variables=own,
+        variables=varied,
         bodies=bodies,
         problem=problem,
     )
@@ -157,7 +157,7 @@ def _of_program(phases: ProgramPhases) -> Iterator[Block]:
         stage = planned.stage
         lying = None if stage.place is None else stage.cell.part
         begins_there = stage.move is None and all(task.holder_posture is None for task in stage.cell.tasks)
-        own = PhaseVariables(
+        varied = PhaseVariables(
             whole=phases.variables, begins_there=begins_there, lying=lying, tasks=tuple(stage.phase.tasks)
         )
         yield Block(
@@ -166,7 +166,7 @@ def _of_program(phases: ProgramPhases) -> Iterator[Block]:
             start=planned.motion.q[0],
             paths={path.task.name: path for path in planned.schedule.paths},
             schedule=planned.schedule,
-            variables=own,
+            variables=varied,
             bodies=bodies,
             problem=problem,
         )

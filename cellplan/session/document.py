@@ -44,6 +44,7 @@ class Document:
     Attributes:
         path: The file.
         allow_dirs: Further folders that the files it names may lie in.
+        given: The cell as it was last read, with the settings of the session.
         changes: The values that were changed since it was read, beside the settings, and the steps to undo and redo.
     """
 
@@ -52,6 +53,7 @@ class Document:
 
         Args:
             path: The file.
+        given: The cell as it was last read, with the settings of the session.
             settings: Values set in the cell from the beginning, each as ``KEY=VALUE``.
             allow_dirs: Further folders that the files it names may lie in.
 
@@ -63,6 +65,7 @@ class Document:
         self._theirs: _Read | None = None  # the file as another program has saved it, until the user decides
         self._files, self._last_look = WatchedFiles(path), time.monotonic()
         self._files.follow(self._read.cell)
+        self.given = self._read.cell
         self.changes = Changes(self._read.cell)
         self._built: tuple[Mapping[str, object], Cell] = ({}, self._read.cell)  # values and the cell that has them
 
@@ -77,11 +80,6 @@ class Document:
         if self._built[0] != values:
             self._built = {**values}, self._read.cell.with_values(values) if values else self._read.cell
         return self._built[1]
-
-    @property
-    def given(self) -> Cell:
-        """The cell as it was last read, with the settings of the session."""
-        return self._read.cell
 
     @property
     def history(self) -> list[str]:
@@ -168,7 +166,7 @@ class Document:
         mine = {} if is_taken else self.changes.values
         cell = read.cell.with_values(mine) if mine else read.cell
         self.changes.move_to(read.cell, is_taken=is_taken)
-        self._read, self._theirs, self._built = read, None, ({**self.changes.values}, cell)
+        self.given, self._read, self._theirs, self._built = read.cell, read, None, ({**self.changes.values}, cell)
         self._files.follow(read.cell)
 
     def _conflict(self, read: _Read, why: str) -> Record:

@@ -123,18 +123,18 @@ def _of_block(cell: Cell, block: Block, first: Scene, factor: int) -> JudgedPhas
         for robot, known in zip(stage.cell.robots, block.cell.robots, strict=True)
     ]
     motion = replace(stage.cell.motion, step=factor * stage.cell.motion.step)
-    own = replace(stage.cell, robots=tuple(robots), motion=motion)
-    paths = clock_paths(own, [build_toolpath(task, own.part) for task in own.tasks])
-    planned = plan_run(own, paths, stage.phase)
-    scene = replace(placed_scene(first, own), cell=own)
+    placed = replace(stage.cell, robots=tuple(robots), motion=motion)
+    paths = clock_paths(placed, [build_toolpath(task, placed.part) for task in placed.tasks])
+    planned = plan_run(placed, paths, stage.phase)
+    scene = replace(placed_scene(first, placed), cell=placed)
     tables = [
         JointTable(
             robot=robot.name,
             joints=robot.model.joint_names,
             times=planned.motion.times,
-            q=planned.motion.q[:, own.columns(robot.name)],
+            q=planned.motion.q[:, placed.columns(robot.name)],
         )
-        for robot in own.robots
+        for robot in placed.robots
     ]
     report = verify_motion(scene, planned.schedule, tables, moving=moving, idle=idle)
     return _with_depths(scene, planned.schedule, replace(report, phase=block.name))

@@ -127,11 +127,11 @@ def of_rows(x: Array, times: Array, q: Array) -> LiveMotion:
 
 def _begun(block: Block, x: Array, start: Array) -> Cell:
     """The cell of a block at values of the variables, its robots on the branches of a start, its steps coarser."""
-    placed, own = block.variables.placed(x), block.cell
+    placed, given = block.variables.placed(x), block.cell
     start = block.variables.layouts(x[None], start[None]).start[0]
     robots = tuple(replace(robot, start=start[placed.columns(robot.name)]) for robot in placed.robots)
-    step = coarser(own, len(block.schedule.times) - 1) * own.motion.step
-    return replace(own, robots=robots, part=placed.part, motion=replace(own.motion, step=step))
+    step = coarser(given, len(block.schedule.times) - 1) * given.motion.step
+    return replace(given, robots=robots, part=placed.part, motion=replace(given.motion, step=step))
 
 
 def coarser(cell: Cell, count: int) -> int:
