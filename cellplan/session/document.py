@@ -53,7 +53,6 @@ class Document:
 
         Args:
             path: The file.
-        given: The cell as it was last read, with the settings of the session.
             settings: Values set in the cell from the beginning, each as ``KEY=VALUE``.
             allow_dirs: Further folders that the files it names may lie in.
 

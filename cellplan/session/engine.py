@@ -2,8 +2,13 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Final
+
+import numpy as np
 
 from cellplan.errors import InputError
+from cellplan.geometry.arrays import Array
+from cellplan.jobs.repair.neat import written_at
 from cellplan.jobs.view.cell_scene import standing_scene
 from cellplan.jobs.view.describe import base_records
 from cellplan.jobs.view.geometries import Geometries
@@ -15,22 +20,27 @@ from cellplan.session.answer import Look, poses, strip_of
 from cellplan.session.blocks import LiveCell
 from cellplan.session.judge import judged
 from cellplan.session.motion import follow, of_rows
-from cellplan.session.starts import as_given, written_starts
-from cellplan.session.variable import Variable
+from cellplan.session.starts import as_given, stated_start, written_starts
+
+SAME_START: Final = 1e-3  # [rad] or [m] within which a start that is written is the one that a motion has
 
 
 class Engine:
     """A cell at values of its variables.
 
     Attributes:
-        given: The cell as it was read.
+        origin: The cell as it was read.
+        given: The same with ``others``, planned.
+        others: Values by address that are no variables.
         values: Values in file units by address; those of the file where there is none.
         shown: Number of the block that is shown.
         version: How often the values were set.
     """
 
-    def __init__(self, cell: Cell, shown: int = 0, version: int = 0) -> None:
-        """Plan the layout of a cell."""
+    def __init__(self, cell: Cell, others: Mapping[str, object] = {}, shown: int = 0, version: int = 0) -> None:
+        """Plan the layout of a cell, with other values than those of variables and starts."""
+        self.origin, self.others = cell, {**others}
+        cell = cell.with_values(others) if others else cell
         self.given = self._live = LiveCell.of(cell)
         works = [place for place, block in enumerate(self.given.blocks) if block.stage.move is None]
         self.shown = shown if 0 < shown < len(self.given.blocks) else works[0]
@@ -55,20 +65,25 @@ class Engine:
         last, shown = self._looks.get(self.shown), self._live.blocks[self.shown]
         self._looks = {self.shown: Look.at(shown, follow(shown, self._x, None if last is None else last.motion))}
 
-    def restore(self, values: Mapping[str, object]) -> None:
-        """Look at the shown block at values of a document, of which those of variables count."""
-        known = {variable.address for variable in self.given.variables.listed}
-        self.move({address: float(str(value)) for address, value in values.items() if address in known})
+    def restore(self, cell: Cell) -> None:
+        """Look at the shown block at the values of a changed cell, whose robots begin as it says."""
+        written = {it: written_at(cell.origin.document, it.address) for it in self.given.variables.listed}
+        self.move({it.address: float(value) for it, value in written.items() if value not in (None, it.given)})
+        look = self._looks[self.shown]
+        stated = stated_start(cell, look.block)
+        if np.abs(look.motion.q[0] - stated).max() > SAME_START:
+            self._begin({self.shown: stated})
 
-    def variable(self, address: str) -> Variable:
-        """The variable at an address.
+    def hold(self) -> None:
+        """Let later motions begin on the branches of the present ones: they are certified."""
+        motions = {place: look.motion for place, look in self._looks.items() if look.motion.is_begun}
+        self._begin({place: motion.q[0] for place, motion in motions.items()})
 
-        Raises:
-            InputError: There is none.
-        """
-        if (variable := self.given.variables.at(address)) is None:
-            raise InputError(f"{address}: expected the address of a number that may be changed, got another one")
-        return variable
+    def _begin(self, starts: Mapping[int, Array]) -> None:
+        """Let blocks begin elsewhere, at stacked joint positions in [rad] or [m], shape (nq,), by their numbers."""
+        self.given, self._live = (_begun(live, starts) for live in (self.given, self._live))
+        self._looks.clear()
+        self.move(self.values)
 
     def starts(self) -> dict[str, object]:
         """Where robots begin in the shown block, by address; as the file says where nothing else was changed."""
@@ -149,3 +164,9 @@ class Engine:
             cell = self.given.cell.with_values(values) if values else self.given.cell
             self._live = self.given.on(cell, placed_scene(self.given.scene, cell))
             self._obstacles = {**values}
+
+
+def _begun(live: LiveCell, starts: Mapping[int, Array]) -> LiveCell:
+    """A live cell whose blocks begin elsewhere, by their numbers."""
+    blocks = (replace(block, start=starts.get(place, block.start)) for place, block in enumerate(live.blocks))
+    return replace(live, blocks=tuple(blocks))

@@ -3,13 +3,14 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Final, Self
 
-from cellplan.errors import InputError
 from cellplan.report.record.common import Record
+from cellplan.session.actions import Actions
 from cellplan.session.answer import CERTIFIED, PLANNED
 from cellplan.session.document import Document
 from cellplan.session.engine import Engine
+from cellplan.session.starts import ADDRESS
 
 SCHEMA: Final = "cellplan.edit/1"
 
@@ -41,6 +42,7 @@ class Session:
     def __init__(self, document: Document) -> None:
         """Use ``open``."""
         self.document, self._engine, self._number = document, Engine(document.given), 0
+        self._actions = Actions(document)
         self._certified: Mapping[str, object] | None = None  # values of the last certified state
 
     @classmethod
@@ -49,7 +51,8 @@ class Session:
         return cls(Document(cell, settings, allow_dirs))
 
     def open_record(self) -> Record:
-        """What a page needs once."""
+        """What a page needs once; a process gets ready for its work meanwhile."""
+        self._actions.get_ready()
         name, file = self.document.cell.name, self.document.path.name
         return {"schema": SCHEMA, "cell": name, "file": file, **self._engine.page(), "answer": self.answer()}
 
@@ -65,7 +68,10 @@ class Session:
             InputError: An address is not that of a variable, it is locked, or a value is out of its range.
         """
         engine = self._engine
-        accepted = {address: engine.variable(address).accepted(float(value)) for address, value in values.items()}
+        accepted = {
+            address: engine.given.variables.variable(address).accepted(float(value))
+            for address, value in values.items()
+        }
         self._number = number
         engine.move({**engine.values, **accepted}, block)
         if accepted:
@@ -81,40 +87,42 @@ class Session:
         self.document.changes.complete()
         return self.answer() if self._engine.settle(self.document.cell) else None
 
-    def do(self, action: str, argument: float | None = None) -> Record:  # noqa: ARG002
+    def do(self, action: str, argument: float | None = None) -> Record:
         """Do something else than a change, and say what becomes of the block that is shown.
 
         Raises:
             InputError: There is no such action, or it is refused.
         """
-        changes, document = self.document.changes, self.document
-        actions: dict[str, Callable[[], Any]] = {
+        document, changes, actions = self.document, self.document.changes, self._actions
+        values: dict[str, Callable[[], object]] = {
             "undo": changes.undo,
             "redo": changes.redo,
             "reset": changes.reset,
+            "take": lambda: changes.set(actions.offered(argument)),
             "save": document.save,
             "reload": document.reload,
             "keep": document.keep,
-            "end": self.close,
         }
-        if action not in actions:
-            raise InputError(f"action: expected one of {', '.join(actions)}, got '{action}'")
-        actions[action]()
-        if action in {"save", "reload", "keep"}:
-            self._engine = Engine(document.given, self._engine.shown, self._engine.version)
-        self._engine.restore(document.changes.values)
+        if action in values:
+            values[action]()
+            self._engine = _restored(self._engine, document)
+        elif action in {"stop", "end"}:
+            (actions.stop if action == "stop" else self.close)()
+        else:
+            actions.start(action, argument, self._engine.version)
         return self.answer()
 
     def poll(self) -> list[Record]:
         """What has happened in the background since it was asked last; it never waits."""
-        event = self.document.look()
-        if event is None:
-            return []
-        if event["state"] != "changed":
-            return [event]
-        self._engine = Engine(self.document.given, self._engine.shown, self._engine.version)
-        self._engine.restore(self.document.changes.values)
-        return [event, {"event": "answer", "answer": self.answer()}]
+        events, is_new = self._actions.events(), False
+        for event in events:
+            if event["event"] == "verdict" and event["passed"] and event["version"] == self._engine.version:
+                self._certified, is_new = {**self.document.changes.values}, True
+        if (seen := self.document.look()) is not None:
+            events.append(seen)
+            if seen["state"] == "changed":
+                self._engine, is_new = _restored(self._engine, self.document), True
+        return [*events, *([{"event": "answer", "answer": self.answer()}] if is_new else [])]
 
     def answer(self) -> Record:
         """What is known of the present values."""
@@ -132,6 +140,7 @@ class Session:
 
     def close(self) -> None:
         """End what works in the background."""
+        self._actions.close()
 
     def __enter__(self) -> Self:
         """Begin a ``with`` statement."""
@@ -142,3 +151,17 @@ class Session:
     ) -> None:
         """See ``close``."""
         self.close()
+
+
+def _restored(engine: Engine, document: Document) -> Engine:
+    """The engine at the values of a document; another one where more than variables is another than before."""
+    variables = engine.given.variables
+    others = {
+        address: value
+        for address, value in document.changes.values.items()
+        if variables.at(address) is None and ADDRESS.fullmatch(address) is None
+    }
+    if others != engine.others or document.given is not engine.origin:
+        engine = Engine(document.given, others, engine.shown, engine.version)
+    engine.restore(document.cell)
+    return engine

@@ -1,13 +1,18 @@
 """Starts of a live cell: where robots begin is written beside what was changed, so that a solve begins there too."""
 
+import re
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
+
+import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.repair.neat import written_at
 from cellplan.model.cell.cell import Cell
 from cellplan.search.variables.written import written_start, written_task_start
 from cellplan.session.blocks import Block
+
+ADDRESS: Final = re.compile(r"(robots|tasks)\.[^.\[]+\.start(_deg)?")  # of a start posture as a whole
 
 
 def written_starts(cell: Cell, block: Block, start: Array) -> dict[str, object]:
@@ -35,3 +40,14 @@ def written_starts(cell: Cell, block: Block, start: Array) -> dict[str, object]:
 def as_given(cell: Cell, values: Mapping[str, object]) -> dict[str, object]:
     """What the file says at the same addresses."""
     return {address: written_at(cell.origin.document, address) for address in values}
+
+
+def stated_start(cell: Cell, block: Block) -> Array:
+    """Where a cell says that a block begins, and as in the block where it says nothing, shape (nq,)."""
+    start, is_program = block.start.copy(), cell.program.is_home_to_home
+    stated = {robot.name: robot.start for robot in cell.robots if not is_program}
+    stated |= {task.robot: task.start_posture for task in cell.tasks if is_program and task.name in block.tasks}
+    for name, posture in stated.items():
+        if posture is not None and cell.robot(name).path is None and name not in block.stage.phase.idle:
+            start[cell.columns(name)] = np.asarray(posture)
+    return start

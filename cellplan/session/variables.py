@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.cell.layout import LayoutSettings, VariableKind, VaryRange
@@ -52,6 +53,16 @@ class LiveVariables:
     def at(self, address: str) -> Variable | None:
         """The variable at an address; None where it is not listed."""
         return next((it for it in self.listed if it.address == address), None)
+
+    def variable(self, address: str) -> Variable:
+        """The variable at an address.
+
+        Raises:
+            InputError: There is none.
+        """
+        if (variable := self.at(address)) is None:
+            raise InputError(f"{address}: expected the address of a number that may be changed, got another one")
+        return variable
 
     def numbers(self, values: Mapping[str, float]) -> Array:
         """The variables of the layout in [m] and [rad], as given where no value in file units is, shape (n,)."""

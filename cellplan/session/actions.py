@@ -1,0 +1,93 @@
+"""Actions of a session that take longer than an answer: work in other processes, and what it offers."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from cellplan.errors import InputError
+from cellplan.report.record.common import Record
+from cellplan.session.document import Document
+from cellplan.session.work import KINDS, Works
+from cellplan.session.works.request import request_of
+
+
+class Actions:
+    """Work on the cell of a document; the first of it starts the processes."""
+
+    def __init__(self, document: Document) -> None:
+        """Begin without work."""
+        self._document = document
+        self._works: Works | None = None
+        self._offers = list[Mapping[str, object]]()  # values of trials and remedies, by their numbers
+
+    def get_ready(self) -> Works:
+        """Start a process that imports what work needs, so that none has to wait for it."""
+        self._works = self._works or Works(self._document.given)
+        return self._works
+
+    def start(self, kind: str, argument: float | None, version: int) -> None:
+        """Begin some work.
+
+        Args:
+            kind: One of ``KINDS``.
+            argument: Seconds of an improvement; of a map the number of the robot, the first operator without one.
+            version: Of the values; stands in the verdict.
+
+        Raises:
+            InputError: There is no such robot, or the values do not go together.
+        """
+        if kind not in KINDS:
+            raise InputError(f"action: expected one that is known, got '{kind}'")
+        cell, works = self._document.cell, self.get_ready()
+        arguments: tuple[object, ...]
+        if kind == "certify":
+            arguments = (cell, version)
+        elif kind == "map":
+            operators = [cell.index(task.robot) for task in cell.tasks if task.robot not in cell.positioners]
+            number = argument if argument is not None else next(iter(operators), 0)
+            if number not in range(len(cell.robots)):
+                raise InputError(f"map: expected the number of a robot below {len(cell.robots)}, got {number:g}")
+            arguments = (cell, cell.robots[int(number)].name)
+        else:
+            arguments = request_of(self._document)
+            arguments += () if argument is None or kind == "repair" else (float(argument),)
+        works.start(kind, *arguments)
+
+    def stop(self) -> None:
+        """End all work."""
+        if self._works is not None:
+            self._works.stop()
+
+    def offered(self, number: float | None) -> Mapping[str, object]:
+        """Values of a trial or a remedy by its number; of the last one for None.
+
+        Raises:
+            InputError: There is none.
+        """
+        place = len(self._offers) - 1 if number is None else number
+        if place not in range(len(self._offers)):
+            raise InputError(f"take: expected a number below {len(self._offers)}, got {place:g}")
+        return self._offers[int(place)]
+
+    def events(self) -> list[Record]:
+        """Events of all work since the last call; what is offered has a number to take it by."""
+        events: list[Record] = [] if self._works is None else self._works.poll()
+        return [self._numbered(event) for event in events]
+
+    def close(self) -> None:
+        """End all work and all processes."""
+        if self._works is not None:
+            self._works.close()
+        self._works = None
+
+    def _numbered(self, event: Record) -> Record:
+        """An event with the numbers of what it offers."""
+        if event["event"] == "trial":
+            return {**event, "number": self._offer(event["values"])}
+        if event["event"] == "remedies":
+            remedies: list[Any] = event["remedies"]
+            return {**event, "remedies": [{**it, "number": self._offer(it["values"])} for it in remedies]}
+        return event
+
+    def _offer(self, values: Mapping[str, object]) -> int:
+        self._offers.append(values)
+        return len(self._offers) - 1
