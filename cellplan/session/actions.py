@@ -70,8 +70,7 @@ class Actions:
 
     def events(self) -> list[Record]:
         """Events of all work since the last call; what is offered has a number to take it by."""
-        events: list[Record] = [] if self._works is None else self._works.poll()
-        return [self._numbered(event) for event in events]
+        return [] if self._works is None else [self._numbered(event) for event in self._works.poll()]
 
     def close(self) -> None:
         """End all work and all processes."""
