@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import PurePath
 from typing import Final, Self
 
 import numpy as np
@@ -81,7 +82,8 @@ class LiveCell:
                 return replace(live, phases=phases, blocks=tuple(_of_program(phases)))
             started, remark = _started(scene), ""
         except (InputError, NoSolutionError) as error:
-            started, remark = _mid_range(cell), str(error).splitlines()[0]
+            started = _mid_range(cell)
+            remark = str(error).splitlines()[0].replace(cell.origin.file, PurePath(cell.origin.file).name)
         blocks = tuple(_block(stage, bodies, variables) for stage in _stages(started))
         return replace(live, scene=replace(scene, cell=started), blocks=blocks, remark=remark)
 

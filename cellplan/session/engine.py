@@ -18,9 +18,9 @@ from cellplan.report.record.common import Record
 from cellplan.session.advice import advice
 from cellplan.session.answer import Look, poses, strip_of
 from cellplan.session.blocks import LiveCell
-from cellplan.session.judge import judged
+from cellplan.session.judge import Judgement, judged, reason
 from cellplan.session.motion import follow, of_rows
-from cellplan.session.starts import as_given, stated_start, written_starts
+from cellplan.session.starts import as_given, started, stated_start, written_starts
 
 SAME_START: Final = 1e-3  # [rad] or [m] within which a start that is written is the one that a motion has
 
@@ -105,10 +105,18 @@ class Engine:
             self._pending = self._settling(cell)
         return next(self._pending, True) is None
 
+    def refuse(self, error: InputError) -> bool:
+        """Note why there is no cell at the present values; False once that is known."""
+        was_settled, self._is_settled = self._is_settled, True
+        judgement = Judgement(is_done=True, lost=reason(self.origin, error))
+        self._looks[self.shown] = self._looks[self.shown].judged(judgement)
+        return not was_settled
+
     def _settling(self, cell: Cell) -> Iterator[None]:
         """Piece by piece: the shown block, the others, what would help."""
         look = self._looks[self.shown]
-        for judgement in judged(self._begun(cell, look), look.block, self.given.scene):
+        begun = started(cell, look.motion.q[0]) if look.motion.is_begun else cell
+        for judgement in judged(begun, look.block, self.given.scene):
             if not look.motion.is_followed and len(judgement.q):
                 look = Look.at(look.block, of_rows(self._x, judgement.times, judgement.q))
             look = self._looks[self.shown] = look.judged(judgement)
@@ -145,18 +153,6 @@ class Engine:
             "blocks": [{"name": block.name, "tasks": list(block.tasks)} for block in self.given.blocks],
             "demands": {"clearance_mm": scene.cell.checks.clearance_mm},
         }
-
-    def _begun(self, cell: Cell, look: Look) -> Cell:
-        """A cell with starts that are to be found where the live motion begins."""
-        if not look.motion.is_begun or cell.program.is_home_to_home:
-            return cell
-        starts = {robot.name: look.motion.q[0, cell.columns(robot.name)] for robot in cell.robots}
-        working = {*cell.positioners, *(task.robot for task in cell.tasks)}
-        robots = (
-            replace(robot, start=starts[robot.name]) if robot.start is None and robot.name in working else robot
-            for robot in cell.robots
-        )
-        return replace(cell, robots=tuple(robots))
 
     def _place_obstacles(self, values: Mapping[str, float]) -> None:
         """Let obstacles stand where values of theirs say, by address."""

@@ -7,6 +7,7 @@ path at every row, is beside it between two of them: some micrometres.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 from typing import Final
 
 import numpy as np
@@ -70,7 +71,7 @@ def judged(cell: Cell, block: Block, first: Scene) -> Iterator[Judgement]:
     try:
         phase = _planned(cell, block, first)
     except (InputError, NoSolutionError) as error:
-        yield Judgement(is_done=True, lost=str(error).splitlines()[0])
+        yield Judgement(is_done=True, lost=reason(cell, error))
         return
     q = stacked_positions(cell, phase.report.q)
     known = Judgement(report=phase.report, times=phase.schedule.times, q=q, lines=_failed([phase.report]))
@@ -83,6 +84,12 @@ def judged(cell: Cell, block: Block, first: Scene) -> Iterator[Judgement]:
     reports = with_task_rules(cell, [phase], [phase.report]) if _is_single(cell) else [phase.report]
     lines = (*_failed(reports), *([unclear] if unclear else ()))
     yield replace(known, is_done=True, is_clear=not unclear, lines=lines)
+
+
+def reason(cell: Cell, error: Exception) -> str:
+    """Why there is no motion, in one line that names the file without its folder."""
+    file = cell.origin.file
+    return str(error).splitlines()[0].replace(file, PurePath(file).name)
 
 
 def _failed(reports: Sequence[Report]) -> tuple[str, ...]:

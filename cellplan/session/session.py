@@ -5,6 +5,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
+from cellplan.errors import InputError
 from cellplan.report.record.common import Record
 from cellplan.session.actions import Actions
 from cellplan.session.answer import CERTIFIED, PLANNED
@@ -85,7 +86,11 @@ class Session:
     def settle(self) -> Record | None:
         """A fuller answer, a bounded piece of work at a time; None once there is nothing left to do."""
         self.document.changes.complete()
-        return self.answer() if self._engine.settle(self.document.cell) else None
+        try:
+            cell = self.document.cell
+        except InputError as error:
+            return self.answer() if self._engine.refuse(error) else None
+        return self.answer() if self._engine.settle(cell) else None
 
     def do(self, action: str, argument: float | None = None) -> Record:
         """Do something else than a change, and say what becomes of the block that is shown.

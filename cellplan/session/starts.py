@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -51,3 +52,17 @@ def stated_start(cell: Cell, block: Block) -> Array:
         if posture is not None and cell.robot(name).path is None and name not in block.stage.phase.idle:
             start[cell.columns(name)] = np.asarray(posture)
     return start
+
+
+def started(cell: Cell, start: Array) -> Cell:
+    """The cell with starts that are to be found at stacked joint positions, shape (nq,); a program as it is."""
+    working = {*cell.positioners, *(task.robot for task in cell.tasks)}
+    if cell.program.is_home_to_home:
+        return cell
+    robots = (
+        replace(robot, start=start[cell.columns(robot.name)])
+        if robot.start is None and robot.name in working
+        else robot
+        for robot in cell.robots
+    )
+    return replace(cell, robots=tuple(robots))

@@ -124,7 +124,8 @@ def _numbers(group: str, keys: Sequence[str], kind: VariableKind, name: str) -> 
 
 def _of_start(cell: Cell, robot: Robot) -> Iterator[VaryRange]:
     """The start posture of a holder, where the file states it."""
-    entry: Any = cell.origin.document["robots"][robot.name]  # type: ignore[index] # a mapping by the schema
+    source: Any = cell.origin.source
+    entry = source.document.root["robots"][robot.name]  # as it was written: a start may have a name
     joints = robot.model.joints
     if robot.path is not None or robot.start is None:
         return

@@ -193,3 +193,15 @@ def test_program_shows_all_blocks() -> None:
     assert [it["state"] for it in answer["strip"]] == ["planned"] * 3
     answer = session.change({}, block=2)
     assert answer["block"] == 2
+
+
+@pytest.mark.slow
+def test_values_that_do_not_go_together_are_said_at_rest() -> None:
+    session = edit(CELLS / "four_robots.yaml")
+    session.change({"robots.abb.base.roll_deg": 3.0})  # its column is upright
+
+    answer = settled(session)
+    assert answer["state"] == "breaks off"
+    assert answer["verdict"].startswith("breaks off: four_robots.yaml:")
+    assert answer["is_settled"]
+    assert session.do("undo")["state"] == "planned"
