@@ -17,6 +17,7 @@ class Actions:
         """Begin without work."""
         self._document = document
         self._works: Works | None = None
+        self._noted = list[Record]()  # events that were not asked for yet
         self._offers = list[Mapping[str, object]]()  # values of trials and remedies, by their numbers
 
     def get_ready(self) -> Works:
@@ -68,9 +69,14 @@ class Actions:
             raise InputError(f"take: expected a number below {len(self._offers)}, got {place:g}")
         return self._offers[int(place)]
 
+    def note(self, event: Record | None) -> None:
+        """Let an event be among the next ones; nothing for None."""
+        self._noted += [] if event is None else [event]
+
     def events(self) -> list[Record]:
-        """Events of all work since the last call; what is offered has a number to take it by."""
-        return [] if self._works is None else [self._numbered(event) for event in self._works.poll()]
+        """Events since the last call; what is offered has a number to take it by."""
+        noted, self._noted = self._noted, []
+        return [*noted, *(self._numbered(event) for event in (self._works.poll() if self._works else ()))]
 
     def close(self) -> None:
         """End all work and all processes."""

@@ -18,6 +18,7 @@ from cellplan.session.blocks import Block
 from cellplan.session.figures import Figure, Loads, clearance_figures, distances_of, joint_figures
 from cellplan.session.judge import Judgement
 from cellplan.session.motion import LiveMotion
+from cellplan.session.seams import branch_figures, seam_figures
 
 PLANNED: Final = "planned"
 BREAKS_OFF: Final = "breaks off"
@@ -45,6 +46,7 @@ class Look:
         figures = [*joint_figures(block.cell, motion, loads)]
         if motion.is_begun:
             figures += clearance_figures(block, motion, distances_of(block.bodies, motion))
+            figures += [*seam_figures(block, motion), *branch_figures(block, motion)]
         return cls(block=block, motion=motion, loads=loads, figures=tuple(figures))
 
     def judged(self, judgement: Judgement) -> "Look":
@@ -78,7 +80,7 @@ class Look:
             return "; ".join(missed)
         if known is not None and known.is_done:
             return "all checks pass on a coarser clock; certify proves it on that of the cell"
-        return "all limits are kept at the nodes looked at"
+        return "all limits are kept at the nodes"
 
     @property
     def record(self) -> Record:
@@ -152,6 +154,6 @@ def numbers(X: Array) -> list[float]:
 
 
 def strip_of(blocks: Sequence[Block], looks: Mapping[int, Look]) -> list[Record]:
-    """All blocks, those that were not looked at as unknown."""
+    """All blocks, those without a motion as unknown."""
     unknown: dict[str, Any] = {"state": UNKNOWN, "text": "not asked yet"}
     return [looks[place].strip if place in looks else {"name": it.name, **unknown} for place, it in enumerate(blocks)]

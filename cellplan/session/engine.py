@@ -50,7 +50,7 @@ class Engine:
         self.move({})
 
     def move(self, values: Mapping[str, float], block: int | None = None) -> None:
-        """Look at a block at other values; None for the one that is shown.
+        """Work out a block at other values; None for the one that is shown.
 
         Raises:
             InputError: There is no such block, or an obstacle cannot stand there.
@@ -66,13 +66,15 @@ class Engine:
         self._looks = {self.shown: Look.at(shown, follow(shown, self._x, None if last is None else last.motion))}
 
     def restore(self, cell: Cell) -> None:
-        """Look at the shown block at the values of a changed cell, whose robots begin as it says."""
+        """Work out the shown block at the values of a changed cell, whose robots begin as it says."""
         written = {it: written_at(cell.origin.document, it.address) for it in self.given.variables.listed}
         self.move({it.address: float(value) for it, value in written.items() if value not in (None, it.given)})
         look = self._looks[self.shown]
         stated = stated_start(cell, look.block)
         if np.abs(look.motion.q[0] - stated).max() > SAME_START:
             self._begin({self.shown: stated})
+            self._looks.clear()
+            self.move(self.values)
 
     def hold(self) -> None:
         """Let later motions begin on the branches of the present ones: they are certified."""
@@ -82,8 +84,6 @@ class Engine:
     def _begin(self, starts: Mapping[int, Array]) -> None:
         """Let blocks begin elsewhere, at stacked joint positions in [rad] or [m], shape (nq,), by their numbers."""
         self.given, self._live = (_begun(live, starts) for live in (self.given, self._live))
-        self._looks.clear()
-        self.move(self.values)
 
     def starts(self) -> dict[str, object]:
         """Where robots begin in the shown block, by address; as the file says where nothing else was changed."""

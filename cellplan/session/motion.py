@@ -16,7 +16,7 @@ from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.problem import Point
 from cellplan.session.blocks import Block
 
-ROWS: Final = 400  # [-] of a motion that is planned while it is looked at, where the steps of its cell are finer
+ROWS: Final = 400  # [-] of a motion that is planned anew for an answer, where the steps of its cell are finer
 APART: Final = 1e-6  # [rad] or [m] between two starts that are the same
 FACTORS: Final = (50, 40, 25, 20, 16, 10, 8, 5, 4, 2)  # [-] times as long steps, the longest first
 
@@ -72,6 +72,8 @@ def _by_kernel(problem: LayoutProblem, x: Array, start: Array, near: LiveMotion 
     job, layouts = problem.job, problem.variables.layouts(x[None], start[None])
     is_near = near is not None and near.is_followed and len(near.q) == len(job.times)
     motions = run_near(job, layouts, near.q[None]) if near is not None and is_near else run(job, layouts)
+    if not is_near and motions.is_followed[0]:  # the integral of the passes, whatever a motion came from
+        motions = run_near(job, layouts, motions.q)
     q, qd, lost_at = _followed(motions, job.times)
     count = len(q)
     rates = job.rates[:count, :count] if count == len(job.times) else np.zeros((count, count))
@@ -135,7 +137,7 @@ def _begun(block: Block, x: Array, start: Array) -> Cell:
 
 
 def coarser(cell: Cell, count: int) -> int:
-    """How many times as long steps a motion of so many is looked at in: 1 where its method depends on them."""
+    """How many times as long steps an answer plans a motion of so many in: 1 where its method depends on them."""
     if not cell.solver.is_accurate or cell.motion.finer is not None or open_feeds(cell):
         return 1
     return next((factor for factor in FACTORS if count % factor == 0 and count // factor >= ROWS), 1)

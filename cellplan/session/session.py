@@ -1,4 +1,4 @@
-"""Session: a cell that is changed while it is looked at; each change is answered with what becomes of the whole job."""
+"""Session: a cell whose layout is changed; each change is answered with what becomes of the whole job."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ SCHEMA: Final = "cellplan.edit/1"
 
 
 def edit(cell: Path | str, *, settings: Iterable[str] = (), allow_dirs: Sequence[Path] = ()) -> "Session":
-    """Open a cell file to change its layout while what becomes of the whole job is looked at.
+    """Open a cell file whose layout is changed, each change answered with what becomes of the whole job.
 
     Args:
         cell: The file; nothing is written into it but by ``do("save")``.
@@ -95,21 +95,26 @@ class Session:
     def do(self, action: str, argument: float | None = None) -> Record:
         """Do something else than a change, and say what becomes of the block that is shown.
 
+        Args:
+            action: undo, redo, reset, save, reload, keep, take, certify, improve, repair, map, stop or end.
+            argument: Of take the number of what was offered, of map that of the robot, of improve its seconds; 1 saves
+                another file.
+
         Raises:
             InputError: There is no such action, or it is refused.
         """
         document, changes, actions = self.document, self.document.changes, self._actions
-        values: dict[str, Callable[[], object]] = {
+        values: dict[str, Callable[[], Record | None]] = {
             "undo": changes.undo,
             "redo": changes.redo,
             "reset": changes.reset,
             "take": lambda: changes.set(actions.offered(argument)),
-            "save": document.save,
+            "save": lambda: document.save(as_another=bool(argument)),
             "reload": document.reload,
             "keep": document.keep,
         }
         if action in values:
-            values[action]()
+            actions.note(values[action]())
             self._engine = _restored(self._engine, document)
         elif action in {"stop", "end"}:
             (actions.stop if action == "stop" else self.close)()
@@ -123,6 +128,7 @@ class Session:
         for event in events:
             if event["event"] == "verdict" and event["passed"] and event["version"] == self._engine.version:
                 self._certified, is_new = {**self.document.changes.values}, True
+                self._engine.hold()
         if (seen := self.document.look()) is not None:
             events.append(seen)
             if seen["state"] == "changed":

@@ -48,9 +48,9 @@ def stated_start(cell: Cell, block: Block) -> Array:
     start, is_program = block.start.copy(), cell.program.is_home_to_home
     stated = {robot.name: robot.start for robot in cell.robots if not is_program}
     stated |= {task.robot: task.start_posture for task in cell.tasks if is_program and task.name in block.tasks}
-    for name, posture in stated.items():
-        if posture is not None and cell.robot(name).path is None and name not in block.stage.phase.idle:
-            start[cell.columns(name)] = np.asarray(posture)
+    for name, configuration in stated.items():
+        if configuration is not None and cell.robot(name).path is None and name not in block.stage.phase.idle:
+            start[cell.columns(name)] = np.asarray(configuration)
     return start
 
 

@@ -1,6 +1,7 @@
 """A live cell: its answers beside plain solves, what it refuses, undo, and that equal changes answer equally."""
 
 import json
+import time
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from cellplan.errors import InputError
 from cellplan.session.blocks import LiveCell
 from cellplan.session.figures import Loads, joint_figures
 from cellplan.session.motion import follow
+from cellplan.session.seams import seam_figures
 from cellplan.session.session import Session
 
 CELLS = Path(__file__).resolve().parents[2] / "cells"
@@ -205,3 +207,59 @@ def test_values_that_do_not_go_together_are_said_at_rest() -> None:
     assert answer["verdict"].startswith("breaks off: four_robots.yaml:")
     assert answer["is_settled"]
     assert session.do("undo")["state"] == "planned"
+
+
+@pytest.mark.slow
+def test_saved_cell_passes_as_it_was_said(tmp_path: Path) -> None:
+    path = tmp_path / "cell.yaml"
+    path.write_bytes((CELLS / "two_robots.yaml").read_bytes())
+    with edit(path) as session:
+        session.move("pen", x_mm=2010)
+        said = settled(session)
+        saved = session.do("save")
+
+        assert (saved["is_saved"], saved["history"]) == (True, [])
+        assert [event["state"] for event in session.poll()] == ["saved"]
+        assert said["state"] == "planned"
+        assert solve(load_cell(path)).passed
+        assert "x_mm" not in path.read_text(encoding="utf-8")  # written in place, as the file has poses
+
+
+@pytest.mark.slow
+def test_certified_state_is_that_of_its_values_alone() -> None:
+    with edit(CELLS / "two_robots.yaml") as session:
+        session.move("pen", x_mm=2010)
+        session.do("certify")
+        until = time.monotonic() + 60.0
+        events: list[Any] = []
+        while time.monotonic() < until and not any(it["event"] == "answer" for it in events):
+            events += session.poll()
+            time.sleep(0.05)
+
+        verdict = next(it for it in events if it["event"] == "verdict")
+        assert verdict["passed"]
+        assert events[-1]["answer"]["state"] == "certified"
+        assert session.move("pen", x_mm=2011)["state"] == "planned"
+        assert session.do("undo")["state"] == "planned"  # of the same step
+
+
+def test_what_is_not_offered_cannot_be_taken(pair: Session) -> None:
+    with pytest.raises(InputError, match="take: expected a number below 0, got 3"):
+        pair.do("take", 3)
+    with pytest.raises(InputError, match="expected one that is known, got 'dance'"):
+        pair.do("dance")
+
+
+@pytest.mark.slow
+def test_positions_of_a_weld_and_its_push_are_in_the_figures() -> None:
+    live = LiveCell.of(load_cell(CELLS / "step_frame.yaml"))
+    block = next(it for it in live.blocks if it.stage.move is None)
+    motion = follow(block, live.variables.layout.given)
+
+    figures = [*seam_figures(block, motion)]
+    welds = [it for it in figures if it.name == "weld rotation"]
+    assert len(welds) == len(block.tasks)
+    assert all(it.binds.endswith("PB") for it in welds)  # fillets, as the guide has them
+    assert [it.value for it in figures if it.name == "push"] == pytest.approx(
+        [0.0] * len(welds), abs=1e-3
+    )  # accuracy of the nodes
