@@ -144,6 +144,8 @@ demo: $(PROGRAM)
 	@echo "open these in a browser:"
 	@echo "  $(CURDIR)/outputs/four-robots/report.html"
 	@echo "  $(CURDIR)/outputs/four-robots/view.html"
+	@echo "drag its bases in a browser, and see at once what becomes of the whole job:"
+	@echo "  $(BIN)/cellplan edit cells/four_robots.yaml"
 	@echo "the program is $(BIN)/cellplan; after '. $(BIN)/activate' it is called cellplan"
 
 # The variable silences an advertisement of the theme, which colours the output.

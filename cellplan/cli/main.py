@@ -22,6 +22,7 @@ from cellplan.cli.begin.robots import robots
 from cellplan.cli.begin.schema import schema
 from cellplan.cli.begin.seams import seams
 from cellplan.cli.command import Work, as_command
+from cellplan.cli.edit.edit import edit
 from cellplan.cli.improve.assign import assign
 from cellplan.cli.improve.base_map import base_map
 from cellplan.cli.improve.compare import compare
@@ -52,6 +53,7 @@ First steps:
   cellplan init my-cell                        a commented cell to begin with
   cellplan check my-cell/cell.yaml --watch     read it again on each save
   cellplan solve my-cell/cell.yaml --view      plan, check, report and 3-D page
+  cellplan edit my-cell/cell.yaml              drag its bases in a browser
 
 cellplan --help lists all commands, cellplan COMMAND --help what one of them can do."""
 EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
@@ -63,6 +65,7 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
         "cellplan solve cell.yaml --watch --view",
     ),
     "view": ("cellplan view outputs/cell", "cellplan view cell.yaml --set robots.kuka.base.x_mm=900"),
+    "edit": ("cellplan edit cell.yaml", "cellplan edit cell.yaml --port 8421 --no-browser"),
     "floorplan": ("cellplan floorplan outputs/cell", "cellplan floorplan cell.yaml --format dxf -o cell.dxf"),
     "verify": ("cellplan verify outputs/cell --cell cell.yaml",),
     "export": (
@@ -131,6 +134,7 @@ app = typer.Typer(
 COMMANDS: Final[dict[str, dict[str, Work]]] = {
     "Begin": {"init": init, "robots": robots, "seams": seams, "check": check, "explain": explain, "schema": schema},
     "Solve": {"solve": solve, "view": view, "floorplan": floor_plan, "verify": verify, "export": export},
+    "Edit": {"edit": edit},
     "Improve": {
         "assign": assign,
         "layout": layout,

@@ -22,6 +22,7 @@ COMMANDS = (
     "assign",
     "check",
     "compare",
+    "edit",
     "explain",
     "export",
     "fastest",

@@ -32,9 +32,9 @@ def test_help_names_every_command_and_nothing_unfinished(capsys: pytest.CaptureF
     assert status == 0
     commands = re.findall(r"^  (\w+) ", reported.partition("Begin:")[2], re.MULTILINE)
     expected = (
-        "init robots seams check explain schema solve view floorplan verify export assign layout map fastest sweep"
+        "init robots seams check explain schema solve view floorplan verify export edit assign layout map fastest"
     )
-    assert commands == [*expected.split(), "compare", "rehearse", "recover"]
+    assert commands == [*expected.split(), "sweep", "compare", "rehearse", "recover"]
 
 
 @pytest.mark.parametrize(

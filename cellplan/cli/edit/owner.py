@@ -6,13 +6,15 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from cellplan.cli.edit.jobs import CHANGE, DO, OPEN, Job, Reply
 from cellplan.cli.edit.responses import ANSWER
 from cellplan.cli.terminal.errors import error_lines
 from cellplan.errors import CellplanError, InputError
-from cellplan.report.record.common import Record
+
+if TYPE_CHECKING:
+    from cellplan.report.record.common import Record
 
 QUIET_S: Final = 0.15  # [s] without a change after which the session settles
 POLL_S: Final = 0.05  # [s] between two polls of worker processes and of the file
@@ -23,19 +25,19 @@ Publish = Callable[[bytes, int | None], None]  # called with one event as JSON, 
 class LiveSession(Protocol):
     """What is served; see ``cellplan.session``."""
 
-    def open_record(self) -> Record:
+    def open_record(self) -> "Record":
         """What a page needs once."""
 
-    def change(self, values: Mapping[str, float], *, block: int | None = None, number: int = 0) -> Record:
+    def change(self, values: Mapping[str, float], *, block: int | None = None, number: int = 0) -> "Record":
         """The answer to new values."""
 
-    def settle(self) -> Record | None:
+    def settle(self) -> "Record | None":
         """A fuller answer, once nothing changes; None if there is nothing left to do."""
 
-    def do(self, action: str, argument: float | None = None) -> Record:
+    def do(self, action: str, argument: float | None = None) -> "Record":
         """The answer to an action."""
 
-    def poll(self) -> list[Record]:
+    def poll(self) -> "list[Record]":
         """What has happened in the background."""
 
 
@@ -116,7 +118,7 @@ class Owner:
             self._note(record, reply[1], job.tab)
         return reply
 
-    def _done(self, job: Job) -> Record:
+    def _done(self, job: Job) -> "Record":
         if job.path == OPEN:
             record = self._session.open_record()
             self.answer = record["answer"]
@@ -132,7 +134,7 @@ class Owner:
                 raise
             return self._session.change(job.values, block=job.block, number=job.number)
 
-    def _note(self, record: Record, text: bytes, tab: int | None) -> None:
+    def _note(self, record: "Record", text: bytes, tab: int | None) -> None:
         """Publish an answer or an event, and settle again later."""
         self._is_settled, self._changed_at = False, time.monotonic()
         if "event" in record:
