@@ -375,8 +375,8 @@ def _weave_remarks(whole: CellDocument) -> Iterator[tuple[str, str]]:
 def _smooth_remarks(whole: CellDocument, tasks: Sequence[Task]) -> Iterator[tuple[str, str]]:
     """Tasks whose paths are smoothed in a tube that is too narrow to gain anything."""
     for task in tasks:
-        entry = whole.tasks[task.name].path.smooth
-        if entry is not None and isinstance(task.path, SampledPath):
+        entry = whole.tasks[task.name]
+        if entry.path.smooth is not None and isinstance(task.path, SampledPath):
             for key, text in narrow_tubes(task.path, entry, task.tool_axis):
                 yield f"tasks.{task.name}.path.smooth.{key}", text
 

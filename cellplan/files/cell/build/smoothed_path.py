@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.files.schema.path import WIDEST_SMOOTHED_DEG, SmoothEntry
+from cellplan.files.schema.task import TaskEntry
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.curves.curve import chord_lengths
 from cellplan.geometry.curves.smoothed_chain import Chain, SmoothedValues, angles_between
@@ -19,6 +20,7 @@ from cellplan.model.task.task import ProgrammedPath, SampledPath
 GAINED: Final = 0.95  # [-] of the roughness of a file: a tube in which more is left gains nothing
 WORTH: Final = 0.8  # [-] of it: a wider tube that leaves no more is proposed
 TRIED: Final = 4  # tubes, each four times as wide as the one before, to see what a wider one gains
+BEYOND: Final = 10.0  # [-] of a tolerance: no tube that is tried is wider
 LEAST_SIDE: Final = 1e-9  # [m] of a path that can be smoothed; a shorter side is refused where the path is drawn
 
 
@@ -54,18 +56,22 @@ def smoothed(path: SampledPath, entry: SmoothEntry, axis: Array | None) -> Sampl
     return replace(path, smoothing=smoothing)
 
 
-def narrow_tubes(path: SampledPath, entry: SmoothEntry, axis: Array | None) -> Iterator[tuple[str, str]]:
-    """Keys of the entry whose tube gains nothing on a path that was smoothed, and how wide one that does has to be."""
-    for key, field, unit in (("position_mm", "of_points", "mm"), ("direction_deg", "of_axes", "deg")):
+def narrow_tubes(path: SampledPath, task: TaskEntry, axis: Array | None) -> Iterator[tuple[str, str]]:
+    """Keys of ``path.smooth`` whose tube gains nothing on a path that was smoothed, and what a wider one leaves."""
+    entry, allowed = task.path.smooth, task.tolerance.filled
+    keys = (
+        ("position_mm", "of_points", "mm", min(BEYOND * allowed.position_mm, FARTHEST_MM)),
+        ("direction_deg", "of_axes", "deg", min(BEYOND * allowed.orientation_deg, WIDEST_SMOOTHED_DEG)),
+    )
+    for key, field, unit, most in keys:
         tube, left = getattr(entry, key), _share(path, field)
-        if left is None or left <= GAINED:
+        if entry is None or left is None or left <= GAINED:
             continue
         others = {"into_mm": entry.into_mm} if key == "position_mm" else {}
-        most = FARTHEST_MM if key == "position_mm" else WIDEST_SMOOTHED_DEG
         for wider in (min(tube * 4.0**k, most) for k in range(1, TRIED + 1)):
             tried = smoothed(path.listed, SmoothEntry.model_validate({key: wider, **others}), axis)
             with_wider = _share(tried, field) or 0.0
-            if with_wider <= WORTH:
+            if with_wider <= WORTH or wider == most:
                 break
         cure = f"one of {wider:g} {unit} leaves {100.0 * with_wider:.0f} %" + (
             "; leave it out" if with_wider > WORTH else ""
