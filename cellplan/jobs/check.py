@@ -32,6 +32,7 @@ from cellplan.runs.plan.program_faults import (
     refuse_touching_configurations,
     refuse_unnamed_supports,
 )
+from cellplan.runs.plan.run_reach import refuse_far_runs
 from cellplan.runs.plan.start import chosen_start, depths_on_paths
 from cellplan.scene.scene import Scene
 
@@ -64,6 +65,7 @@ def check(cell: Cell, *, scene: Scene | None = None, progress: Progress = silent
         InputError: A path misses the part, or a given start is out of limits or off its task.
         NoSolutionError: No start posture was found.
     """
+    refuse_far_runs(cell)
     if cell.program.is_home_to_home:
         return _check_program(cell, progress)
     return _check_together(scene or Scene.from_cell(cell), progress)

@@ -34,8 +34,9 @@ def standoffs(cell: Cell, schedule: Schedule, chains: Chains, q: RobotRows) -> t
         if task.relative_to is not Frame.PART:
             continue
         rows = np.flatnonzero((times >= max(task.start, task.judged_from)) & (times <= scheduled.end + task.off_delay))
-        if len(scheduled.process_on) > 1 or (task.process is not None and any(task.process.runs)):
-            rows = rows[are_within(times[rows], scheduled.process_on)]
+        spans = scheduled.process_on if len(scheduled.process_on) > 1 else (scheduled.work,)
+        if len(spans) > 1 or any(scheduled.runs):
+            rows = rows[are_within(times[rows], spans)]
         rows = rows if len(rows) else np.array([len(times) - 1])
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(POSE_COUNT, len(rows))).round().astype(np.intp))]
         some = {name: values[rows] for name, values in q.items()}

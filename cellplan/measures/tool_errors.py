@@ -58,6 +58,8 @@ def pose_accuracy(scheduled: TaskSchedule, X_PT: Array) -> TaskAccuracy:
         end_s=scheduled.end,
         judged_from=task.judged_from,
         lean=lean_of(X_PT, scheduled.X_PT) if task.tilt else None,
+        runs=scheduled.runs,
+        process_on=(scheduled.process_on[0][0], scheduled.process_on[-1][1]) if scheduled.process_on else (0.0, 0.0),
         process_off=tuple((off, on) for (_, off), (on, _) in pairwise(scheduled.process_on)),
     )
 

@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+import numpy as np
+
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.progress import Progress
@@ -19,6 +21,7 @@ from cellplan.model.settings.entry import FASTEST_MM_S
 from cellplan.model.task.task import Task
 from cellplan.model.units import MM
 from cellplan.planning.path.build import build_toolpath
+from cellplan.runs.run_lengths import BORDER, OpenRun, on_run, open_runs
 from cellplan.runs.solution import Solution
 from cellplan.scene.scene import Scene
 
@@ -199,7 +202,7 @@ def at_greatest_feeds(
         InputError: A path cannot be run along at any feed.
         NoSolutionError: No feed that will do holds.
     """
-    trials = _Trials(cell, opened, solved)
+    trials, sought = _Trials(cell, opened, solved), open_runs(cell)
     groups = _groups(cell, opened, trials, is_leximin=is_leximin)
     for trial in range(MOST_TRIALS):
         rising = [group for group in groups if group.rising]
@@ -207,7 +210,7 @@ def at_greatest_feeds(
             break
         progress("greatest feeds", trial / MOST_TRIALS)
         try:
-            answers = _answers(trials.at(_feeds(groups), timing=Timing.AS_WRITTEN)[1])
+            answers = _answers(trials.at(_feeds(groups), timing=Timing.AS_WRITTEN)[1], sought)
         except (InputError, NoSolutionError) as error:
             named = [group for group in rising if any(f"tasks.{name}." in str(error) for name in group.tried)]
             rising, answers = named or rising, {}
@@ -215,7 +218,7 @@ def at_greatest_feeds(
             group.note(answers)
     for trial in range(MOST_RETIMED):
         scene, solution = trials.at(_feeds(groups), timing=None)
-        answers = _answers(solution)
+        answers = _answers(solution, sought)
         failing = [group for group in groups if not group.is_held(answers)]
         if not failing:
             break
@@ -262,9 +265,18 @@ def _feeds(groups: Sequence[_Group]) -> dict[str, float]:
     return {name: feed for group in groups for name, feed in group.tried.items()}
 
 
-def _answers(solution: Solution) -> Feeds:
-    """Greatest feeds along the paths of a program, by task."""
-    return {feed.task: feed for run in solution.runs for feed in run.report.greatest_feeds}
+def _answers(solution: Solution, sought: Sequence[OpenRun]) -> Feeds:
+    """Greatest feeds along the paths of a program, by task; runs that are as long as limits need do not bind them."""
+    answers = {feed.task: feed for run in solution.runs for feed in run.report.greatest_feeds}
+    scheduled = {it.task.name: it for run in solution.runs for it in run.schedule.tasks}
+    for run in sought:
+        if (answer := answers.get(run.task.name)) is not None:
+            inside = on_run(scheduled[run.task.name], answer, run.is_first, border=-BORDER)
+            feeds = answer.feeds.copy()
+            feeds[inside] = np.where(feeds[inside] >= answer.feed, np.inf, feeds[inside])
+            is_in_ramp = answer.is_in_ramp and float(feeds.min()) == answer.greatest
+            answers[run.task.name] = replace(answer, feeds=feeds, is_in_ramp=is_in_ramp)
+    return answers
 
 
 def _refuse_too_slow(opened: Sequence[OpenFeed], feeds: Mapping[str, float], answers: Feeds) -> None:

@@ -30,7 +30,9 @@ from cellplan.runs.plan.near import read_branches, with_run_named
 from cellplan.runs.plan.program import ProgramClock, refuse_clock_name
 from cellplan.runs.plan.retiming import retimed
 from cellplan.runs.plan.run import plan_run
+from cellplan.runs.plan.run_reach import refuse_far_runs
 from cellplan.runs.plan.start import chosen_start
+from cellplan.runs.run_lengths import open_runs, with_run_lengths
 from cellplan.runs.solution import Run, Solution
 from cellplan.scene.scene import Scene
 
@@ -74,9 +76,13 @@ def solve_motion(
     """
     if opened := open_feeds(cell, task):
         return _at_greatest_feeds(cell, opened, task=task, near=near, progress=progress, early=early)
+    if sought := open_runs(cell, task):
+        made = partial(solve_motion, task=task, near=near, progress=progress)
+        return _begun(with_run_lengths(cell, sought, made, progress=progress), early)
     refuse_clock_name(cell)
     branches = None if near is None else read_branches(near, cell)
     cell = with_run_named(cell, branches)
+    refuse_far_runs(cell)
     if cell.program.is_home_to_home:
         return _solve_program(cell, task=task, near=branches, early=early, progress=progress)
     scene = Scene.from_cell(cell)
@@ -111,11 +117,15 @@ def _at_greatest_feeds(
 ) -> tuple[Scene, Solution]:
     """The program at the greatest feeds; see ``solve_motion``."""
     solved = partial(solve_motion, task=task, near=near, progress=progress)
-    scene, solution = at_greatest_feeds(cell, opened, solved, is_leximin=cell.motion.is_leximin, progress=progress)
-    for run in solution.runs:
+    return _begun(at_greatest_feeds(cell, opened, solved, is_leximin=cell.motion.is_leximin, progress=progress), early)
+
+
+def _begun(result: tuple[Scene, Solution], early: EarlyClearance | None) -> tuple[Scene, Solution]:
+    """A program that was chosen from several, the clearance of its phases begun with."""
+    for run in result[1].runs:
         if early is not None:
             early.begin(run.scene, run.schedule, stacked_positions(run.cell, run.report.q))
-    return scene, solution
+    return result
 
 
 def _of_phase(moved: Sequence[MovedStart], phase: Phase) -> tuple[MovedStart, ...]:

@@ -233,18 +233,35 @@ def test_the_feed_holds_all_along_the_work_where_the_tool_runs_in_and_out(tmp_pa
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"process.on_delay_s": 1}, "process.on_delay_s: unexpected key beside run_in_mm or run_out_mm"),
-        ({"process.ramp_s": 1}, "process.ramp_s: unexpected key beside run_in_mm or run_out_mm"),
+        ({"process.on_delay_s": 1}, "process.on_delay_s: unexpected key beside a run in which the tool comes to its"),
+        ({"process.off_delay_s": 1}, "process.off_delay_s: unexpected key beside a run in which the tool slows down"),
+        ({"process.ramp_s": 1}, "process.ramp_s: unexpected key beside a run in which the tool comes to its feed"),
+        ({"process.run_out_mm": 0, "process.lead_s": 0.1}, "process.lead_s: expected run_in_mm and run_out_mm beside"),
+        (
+            {"process.run_in_mm": 0, "process.run_out_mm": 0, "process.lift_mm": 5},
+            "process.lift_mm: unexpected key without a run: write run_in_mm or run_out_mm",
+        ),
+        (
+            {"process.lead_s": 0.7},
+            "process.lead_s: expected at most 0.6667 s, which the tool takes along its run-in, got 0.7; make",
+        ),
+        (
+            {"process.run_in_mm": 0, "process.ramp_mm": 195},
+            "or make it shorter than 188.5 mm",
+        ),
+        (
+            {"process.run_arc_mm": 5},
+            "process.run_arc_mm: expected a tool that points across its path at both ends",
+        ),
         ({"repeat": 2}, "process.run_in_mm: expected none beside repeat; leave one of them out"),
         (
             {"path.circle": None, "path.rectangle": {"sides_mm": [30, 30], "plane": "xy", "center_mm": [0, 120]}},
             "process.run_in_mm: expected a path without stops between its ends, got 3; round the corners",
         ),
-        ({"process.run_in_mm": 900}, "task 'ring', with its approach of 5 mm and its run-in of 900 mm ("),
-        ({"process.run_in_mm": 900}, "out of reach, the best attempt leaves its tool tip 8"),
+        ({"process.run_in_mm": 900}, "expected a run-in within the reach of 'top', got one of 900 mm: 150 mm from the"),
         (
-            {"process.run_in_mm": 200, "process.run_out_mm": None},
-            "process.run_in_mm: expected less than half of the path and its run, 194.2 mm, as the ramp at its other",
+            {"process.run_tolerance_mm": 0.05},
+            "process.run_tolerance_mm: expected at least 0.1 mm, the tolerance of the task, got 0.05; leave it out",
         ),
     ],
 )

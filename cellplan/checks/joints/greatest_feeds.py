@@ -83,7 +83,7 @@ def _between(times: Array, scheduled: TaskSchedule, errors: TaskAccuracy) -> _Lo
     if errors.between is not None:
         for error, tolerance in zip((errors.between.position, errors.between.orientation), allowed, strict=True):
             row = int(np.argmin(np.abs(times - error.at_s)))
-            shares[row] = max(shares[row], (error.largest / tolerance) ** 0.5)
+            shares[row] = max(shares[row], (error.easing * error.largest / tolerance) ** 0.5)
     return _Load(scheduled.task.name, BETWEEN_ROWS, shares)
 
 
@@ -93,7 +93,7 @@ def _greatest(times: Array, scheduled: TaskSchedule, feed: float, loads: Sequenc
     shares = np.max([load.shares[inside] for load in loads], axis=0)
     row = int(inside[shares.argmax()])
     worst = max(loads, key=lambda load: float(load.shares[row]))
-    run_in = scheduled.task.process.runs[0] if scheduled.task.process else 0.0
+    run_in = scheduled.runs[0]
     steady = [(begin - TIME_TOLERANCE, end + TIME_TOLERANCE) for begin, end, _ in scheduled.demanded]
     return GreatestFeed(
         task=scheduled.task.name,

@@ -77,8 +77,8 @@ def with_between(at_rows: Sequence[Check], between: Sequence[Check]) -> tuple[Ch
 def _check(name: str, error: BetweenError, subject: str, *, allowed: float, of: str) -> Check:
     """The largest error of one kind against its limit, with the step that would keep it."""
     unit, scale = MILLIMETRES if "position" in name else DEGREES
-    what, passed = name.removesuffix(BETWEEN).replace("_", " "), error.largest <= allowed
-    value, limit = scale * error.largest, scale * allowed
+    what, passed = name.removesuffix(BETWEEN).replace("_", " "), error.largest * error.easing <= allowed
+    value, limit = scale * error.largest, scale * allowed / error.easing
     message = (
         f"{what} {of} between the rows of its table: {value:.3g} {unit} at {error.at_s:.4f} s, allowed {limit:g} {unit}"
     )

@@ -37,6 +37,7 @@ ESTIMATE_FRACTION: Final = 0.1  # [-] taken off a step that is estimated from a 
 SIDE_FRACTION: Final = 1e-4  # [-] of a step: how far on both sides of a time a change of velocity is measured
 SIDES: Final = (-SIDE_FRACTION, 0.0, SIDE_FRACTION)
 KINK_FRACTION: Final = 0.1  # [-] of what is allowed: a smaller error by a change of speed does not count
+INSIDE: Final = 2.0 * TIME_TOLERANCE  # [s] from an end of a step: a run may end with a row
 ROTATIONS: Final = (3, 4, 5)
 
 
@@ -51,6 +52,11 @@ class _MeasuredTool:
     first: int  # first row from which on it is judged
     # by how much it may be off besides at the rows in [m] and [rad], shape (N, 2); None for nothing
     off: Array | None = None
+    easing: Array | None = None  # share of its position error that counts, in each step, shape (N - 1,); None for all
+
+    def counted(self, errors: Array, k: Indices) -> Array:
+        """What counts of errors in [m] and [rad] in steps k, shape (M, 2)."""
+        return errors if self.easing is None else errors * np.stack([self.easing[k], np.ones(len(k))], axis=1)
 
     def more(self, k: Indices, s: Array) -> Array:
         """By how much it may be off besides at shares s of steps k, shape (M, 2)."""
@@ -116,10 +122,11 @@ class ErrorsBetweenRows:
         return [
             _MeasuredTool(
                 relation=scheduled.task,
-                at_rows=_lengths(errors),
+                at_rows=_lengths(errors) * np.stack([scheduled.easing(times), np.ones(len(times))], axis=1),
                 allowed=scheduled.task.tolerance.between,
                 place=place,
                 first=scheduled.task.first_judged(times),
+                easing=np.maximum(scheduled.easing(times[:-1] + INSIDE), scheduled.easing(times[1:] - INSIDE)),
             )
             for place, (scheduled, errors) in enumerate(zip(self._schedule.tasks, accuracy, strict=True))
         ]
@@ -169,7 +176,7 @@ class ErrorsBetweenRows:
             relation, X_WT = tool.relation, chains[tool.relation.robot].tool_poses(q[tool.relation.robot])
             desired = poses_desired[tool.place or 0] if isinstance(relation, Task) else relation.X_PT[None]
             X_PT = relative_to_task_frame(relation, X_WT, X_WP)
-            errors[:, place] = error_lengths(X_PT, desired, relation) + tool.more(k, s)
+            errors[:, place] = tool.counted(error_lengths(X_PT, desired, relation) + tool.more(k, s), k)
         return errors
 
     def _bounds(self, tool: _MeasuredTool, middle: Array, sag: Array) -> Array:
@@ -228,11 +235,13 @@ class ErrorsBetweenRows:
         judged = measured.bounds[tool.first :, kind][is_plain[tool.first :]]
         wide = bool(judged.size) and float(judged.max()) > allowed
         known = measured.bounds[tool.first :, kind][~measured.chosen[tool.first :]]
+        easing = np.ones(count) if tool.easing is None or kind else tool.easing
         return BetweenError(
-            largest=float(errors[worst]),
+            largest=float(errors[worst] / easing[k[worst]]),
             at_s=at_s,
-            bound=None if wide else max(float(errors[worst]), float(known.max(initial=0.0))),
+            bound=None if wide else max(float(errors[worst]), float(known.max(initial=0.0))) / float(easing.min()),
             longest_step=self._longest_step(measured, kind, errors=errors, rows=rows, k=k),
+            easing=float(easing[k[worst]]),
         )
 
     def _longest_step(

@@ -72,7 +72,7 @@ def check_listed(task: Task, errors: ListedErrors | None) -> Iterator[Check]:
 def _on_file(schedule: Schedule, path: ClockedPath, travelled: Array) -> Flags:
     """Which rows are on a path, but for its runs, of which its file says nothing, shape (N,)."""
     nominal = schedule.times if schedule.clock is None else schedule.clock.sigma
-    run_in, run_out = (0.0, 0.0) if path.task.process is None else path.task.process.runs
+    run_in, run_out = path.toolpath.runs
     end = path.task.repeat * path.toolpath.length - run_out
     on_path = (nominal >= path.start) & (nominal <= path.end)
     return on_path & (travelled >= run_in - SAME_LENGTH) & (travelled <= end + SAME_LENGTH)

@@ -18,6 +18,7 @@ from cellplan.model.robot.robot import configuration_in_si, start_keys
 from cellplan.model.settings.assign import POSTURE_LIMIT, AssignEntry
 from cellplan.runs.overrides import read_settings
 from cellplan.runs.plan.program_faults import refuse_crowded_homes, refuse_touching_configurations
+from cellplan.runs.run_lengths import refuse_open_runs
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.problem.goals import Stations, task_goals
 from cellplan.search.assign.problem.reach import places_in_reach
@@ -171,6 +172,7 @@ def refuse_unless_assignable(cell: Cell) -> None:
         raise InputError(
             f"{at('program')}: missing, expected program: {{}}, as an assignment is made from home to home"
         )
+    refuse_open_runs(cell, "an assignment")
     if cell.positioners and cell.motion.mode not in RESTS:
         raise InputError(
             f"{at('motion.mode')}: expected semi_coordinated or part_at_rest, got {cell.motion.mode}: in what an "

@@ -18,6 +18,7 @@ from cellplan.planning.modes import plan_phases
 from cellplan.planning.start.given import part_pose
 from cellplan.runs.overrides import with_overrides
 from cellplan.runs.plan.work_phases import WorkPhase, work_phases
+from cellplan.runs.run_lengths import refuse_open_runs
 from cellplan.scene.mounting import Mount, MountedPair
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.starts import StartGoal, starts_at
@@ -155,6 +156,7 @@ def refuse_map(cell: Cell, name: str, grid: BaseGrid) -> None:
             f"({', '.join(dict.fromkeys(operators)) or 'there is none'}), got '{name}'"
         )
     refuse_other_methods(cell, "a map of bases")
+    refuse_open_runs(cell, "a map of bases")
     if not cell.program.is_home_to_home:
         plan_phases(cell)  # refuses modes that need a program, and robots with two tasks at once
     grid.refuse(cell.robot(name))

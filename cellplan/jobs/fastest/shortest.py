@@ -26,6 +26,7 @@ from cellplan.model.report.report import REDUCED_SPEED
 from cellplan.model.units import MM
 from cellplan.report.record.figures import LOAD
 from cellplan.runs.greatest_feeds import OpenFeed, open_feeds, open_values, stated_values
+from cellplan.runs.run_lengths import lengths_in, open_runs
 from cellplan.runs.solve import solve_motion
 from cellplan.study.run import outcomes
 from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
@@ -150,12 +151,13 @@ def fastest(
 
 
 def _with_stated_feeds(cell: Cell, opened: Sequence[OpenFeed], task: str | None, progress: Progress) -> Cell:
-    """The cell with the greatest feeds, which also hold at the best common speed, in place of open ones."""
-    if not opened:
+    """The cell with the greatest feeds, which also hold at the best common speed, and with lengths of runs."""
+    sought = open_runs(cell, task)
+    if not opened and not sought:
         return cell
     _, solution = solve_motion(cell.with_values({"motion.timing": "fastest"}), task=task, progress=progress)
     stated = {feed.task.name: solution.cell.task(feed.task.name).feed or 0.0 for feed in opened}
-    return cell.with_values(stated_values(opened, stated))
+    return cell.with_values(stated_values(opened, stated) | lengths_in(solution.cell, sought))
 
 
 def _at_reduced_speed(

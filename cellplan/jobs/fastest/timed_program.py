@@ -177,7 +177,8 @@ def _share_between(errors: TaskAccuracy, cell: Cell) -> float:
     if errors.between is None:
         return 0.0
     position, orientation = cell.task(errors.task).tolerance.between
-    return max(errors.between.position.largest / position, errors.between.orientation.largest / orientation)
+    on_path = errors.between.position
+    return max(on_path.easing * on_path.largest / position, errors.between.orientation.largest / orientation)
 
 
 def scaled_values(cell: Cell, factor: float, opened: Sequence[OpenFeed] = ()) -> dict[str, object]:

@@ -13,7 +13,7 @@ from cellplan.geometry.frozen import derive
 from cellplan.model.motion.joint_path import JointPath
 from cellplan.model.motion.plan import Phase, Plan, rows_of
 from cellplan.model.solver import Integrator
-from cellplan.model.task.clocked_path import ClockedPath, DemandedSpan, Spans, distinct
+from cellplan.model.task.clocked_path import ClockedPath, DemandedSpan, Spans, distinct, run_easing
 from cellplan.model.task.task import TIME_TOLERANCE, Task
 
 
@@ -76,8 +76,14 @@ class TaskSchedule:
     stops: tuple[float, ...] = ()
     demanded: tuple[DemandedSpan, ...] = ()  # stretches of time in which the feed of a process is demanded
     process_on: Spans = ()  # stretches of time in [s] in which a process is on; without one, that of the path
+    work: tuple[float, float] = (-np.inf, np.inf)  # begin and end in [s] of the work, between the runs of its tool
+    runs: tuple[float, float] = (0.0, 0.0)  # lengths in [m] of the run-in and of the run-out, which belong to the path
     # largest distance in [m] of a smooth path from the straight lines between its points, else None
     bulge: float | None = None
+
+    def easing(self, times: Array) -> Array:
+        """Share of a position error that counts against the tolerance at times in [s], less on runs, shape (N,)."""
+        return run_easing(self.task, (self.begin, self.end), self.work, times)
 
     @property
     def begin(self) -> float:

@@ -17,6 +17,7 @@ class BetweenError:
     # a step in [s] that meets the tolerance for all tools, by the way errors grow with the step; None where the error
     # is small enough, or too large at the rows already
     longest_step: float | None = None
+    easing: float = 1.0  # share of it that counts against the tolerance: less on the runs of a process
 
     @property
     def proof(self) -> str:

@@ -106,6 +106,8 @@ class TaskAccuracy:
         None  # largest angle in [rad] of a tool's axis from the desired one, where it may lean; or None
     )
     process_off: Spans = ()  # stretches of time in [s] along its path, from rapid to rapid, in which its process is off
+    runs: tuple[float, float] = (0.0, 0.0)  # lengths in [m] of the run-in and of the run-out, which are in the path
+    process_on: tuple[float, float] = (0.0, 0.0)  # times in [s] between which its process is on, rapids included
     listed: ListedErrors | None = None  # errors against the points of its file, where its path was smoothed; or None
 
 

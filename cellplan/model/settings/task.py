@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, Tag, model_validator
 
 from cellplan.model.settings.entry import Entry, SlidingSpeed, by_kind, rule, setting
+from cellplan.model.settings.runs import RunsEntry
 from cellplan.model.settings.units import Deg, Mm, MmPerS, Within
 
 FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
@@ -131,7 +132,7 @@ FeedChoice = Annotated[
 ]
 
 
-class ProcessEntry(Entry):
+class ProcessEntry(RunsEntry):
     """A process that demands a feed: welding, sealing, dispensing."""
 
     feed_mm_s: FeedChoice | None = setting(
@@ -163,20 +164,6 @@ class ProcessEntry(Entry):
         None, "Length of path on which it does, in place of ramp_s: all motion then scales with the feed."
     )
 
-    run_in_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = setting(
-        Mm(0.0),
-        "Length along the tangent on which the tool comes to the start of its path and to the feed, the process off. "
-        "The ramps are then as long as the shorter run.",
-    )
-    run_out_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = setting(
-        Mm(0.0), "Likewise behind the end of its path, on which the tool slows down."
-    )
-
-    @property
-    def runs(self) -> tuple[float, float]:
-        """Lengths in [m] of the run-in and of the run-out."""
-        return self.run_in_mm.si, self.run_out_mm.si
-
     @property
     def feed(self) -> float:
         """Demanded speed in [m/s], the greatest one of a path with several; a slow one while it is open."""
@@ -197,26 +184,32 @@ class ProcessEntry(Entry):
     @property
     def scales(self) -> bool:
         """Whether its ramps have lengths, so that all motion scales with the feed."""
-        return self.ramp_mm is not None or any(self.runs)
+        return self.ramp_mm is not None or all(self.has_runs)
 
     @property
     def ramp(self) -> float:
-        """Time of a ramp in [s]: on its length the mean speed is half the feed."""
-        lengths = [run for run in self.runs if run > 0.0] if self.ramp_mm is None else [self.ramp_mm.si]
-        if lengths:
-            return 2.0 * min(lengths) / self.feed
+        """Time in [s] of a ramp on the work: on its length the mean speed is half the feed."""
+        if self.ramp_mm is not None:
+            return 2.0 * self.ramp_mm.si / self.feed
         return USUAL_RAMP if self.ramp_s is None else self.ramp_s
+
+    def ramps(self, runs: tuple[float, float]) -> tuple[float, float]:
+        """Times in [s] of the first ramp and of the last: as long as runs of lengths in [m], on the work without."""
+        first, last = (2.0 * run / self.feed if run > 0.0 else self.ramp for run in runs)
+        return first, last
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         """Only open feeds have a ratio; a ramp has a time or a length, and a length needs a feed."""
         if self.ramp_mm is not None and self.ramp_s is not None:
             raise rule("expected either ramp_s or ramp_mm, got both", "ramp_mm")
-        for key in ("ramp_s", "ramp_mm", "on_delay_s", "off_delay_s") if any(self.runs) else ():
-            if getattr(self, key):
-                raise rule("unexpected key beside run_in_mm or run_out_mm, in which the tool comes to its feed", key)
-        if any(self.runs) and self.feed_mm_s is None:
-            raise rule("unexpected key for a path whose file states the feeds", "run_in_mm")
+        runs_in, runs_out = self.has_runs
+        both, is_excluded = runs_in and runs_out, "unexpected key beside a run in which the tool"
+        for key, has_run in (("ramp_s", both), ("ramp_mm", both), ("on_delay_s", runs_in), ("off_delay_s", runs_out)):
+            if has_run and getattr(self, key):
+                raise rule(f"{is_excluded} {'slows down' if key == 'off_delay_s' else 'comes to its feed'}", key)
+        if (runs_in or runs_out) and self.feed_mm_s is None:
+            raise rule("unexpected key for a path whose file states the feeds", self.run_key)
         if self.ramp_mm is not None and self.feed_mm_s is None:
             raise rule("unexpected key for a path whose file states the feeds; write ramp_s", "ramp_mm")
         if self.feed_ratio != 1.0 and not self.has_open_feed:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -90,8 +89,8 @@ class ClockedPath:
         if self.task.approach is not None:
             breaks.append(np.array([self.task.start - self.task.approach.duration]))
         if self.task.time_law.kind in {TimeLawKind.TRAPEZOID, TimeLawKind.STEADY} and not self.toolpath.is_timed:
-            ramp = ramp_shares(self) * np.diff(self.corners)
-            breaks += [self.corners[:-1] + ramp, self.corners[1:] - ramp]
+            first, last = (ramp_shares(self) * np.diff(self.corners)[:, None]).T
+            breaks += [self.corners[:-1] + first, self.corners[1:] - last]
         return distinct(np.concatenate(breaks))
 
     def at(self, times: Array, within: Interval) -> tuple[Array, Array]:
@@ -195,7 +194,7 @@ class ClockedPath:
         s, piece = s[is_inside], piece[is_inside]
         if path.runs_on:
             share = (cycles + np.append(0.0, s / self.behind[-1])).ravel() / self.task.repeat
-            return self.start + (self.end - self.start) * reached_at(law, share, float(ramps[0]))
+            return self.start + (self.end - self.start) * reached_at(law, share, float(ramps[0, 0]))
         stretch = cycles * pieces + piece
         done = np.broadcast_to((s - self.behind[piece]) / np.diff(self.behind)[piece], stretch.shape)
         tau = reached_at(law, done, ramps[stretch], None if self.pace is None else self.pace.drops[stretch])
@@ -258,21 +257,32 @@ def leaves_at(task: Task, corners: Array) -> float:
 def process_spans(path: ClockedPath) -> Spans:
     """Stretches of time in [s] in which a process is on; without one, that from the start of the path to its end."""
     task, corners, pace = path.task, path.corners, path.pace
-    if task.process is not None and any(task.process.runs):
-        return (_between_runs(path, task.process),)
     if pace is None:
-        return ((task.start, path.end + task.off_delay),)
+        lead = 0.0 if task.process is None else task.process.lead_s
+        begin, end = work_span(path)
+        return ((begin - lead, end - lead),)
     edges = np.flatnonzero(np.diff(pace.is_on.astype(np.int8))) + 1  # off and on in turns
     inner = corners[edges].tolist()
     ends = [task.start, *inner, path.end + task.off_delay]
     return tuple(zip(ends[0::2], ends[1::2], strict=True))
 
 
-def _between_runs(path: ClockedPath, process: ProcessEntry) -> tuple[float, float]:
-    """Times in [s] at which the tool has come in, at its feed, and begins to run out."""
-    halves = 0.5 * process.ramp  # a ramp takes this longer than its length does at the feed
-    on, off = (run / process.feed + halves if run else 0.0 for run in process.runs)
-    return path.start + on, path.end - off
+def work_span(path: ClockedPath) -> tuple[float, float]:
+    """Begin and end in [s] of the work: of the path with the delays of its process, or between its runs."""
+    task, (run_in, run_out) = path.task, path.toolpath.runs
+    first, last = (0.0, 0.0) if task.process is None else task.process.ramps(path.toolpath.runs)
+    return path.start + first if run_in else task.start, path.end - last if run_out else path.end + task.off_delay
+
+
+def run_easing(task: Task, path: tuple[float, float], work: tuple[float, float], times: Array) -> Array:
+    """Share of a position error that counts against the tolerance of a task, less on its runs, shape (N,).
+
+    ``path`` and ``work`` are the begins and ends in [s] of both; times are in [s], shape (N,).
+    """
+    stated = None if task.process is None else task.process.run_tolerance_mm
+    off_work = (times < work[0] - TIME_TOLERANCE) | (times > work[1] + TIME_TOLERANCE)
+    on_run = off_work & (times >= path[0] - TIME_TOLERANCE) & (times <= path[1] + TIME_TOLERANCE)
+    return np.where(on_run, 1.0 if stated is None else task.tolerance.position_mm / stated, 1.0)
 
 
 def fixed_rests(path: ClockedPath) -> Spans:
@@ -290,11 +300,12 @@ def demanded_spans(path: ClockedPath) -> tuple[DemandedSpan, ...]:
     task, corners, pace = path.task, path.corners, path.pace
     if task.process is None:
         return ()
-    ramp = task.process.ramp
     if pace is None:
-        spans = [DemandedSpan(begin + ramp, end - ramp, task.process.feed) for begin, end in pairwise(corners.tolist())]
+        first, last = (ramp_shares(path) * np.diff(corners)[:, None]).T
+        both = zip(corners[:-1] + first, corners[1:] - last, strict=True)
+        spans = [DemandedSpan(float(begin), float(end), task.process.feed) for begin, end in both]
     else:
-        ramps = ramp * (pace.drops > 0.0)
+        ramps = task.process.ramp * (pace.drops > 0.0)
         ends = zip(corners[:-1] + ramps[:, 0], corners[1:] - ramps[:, 1], pace.tops, strict=True)
         spans = [DemandedSpan(*map(float, it)) for it, has_feed in zip(ends, pace.is_at_feed, strict=True) if has_feed]
     return tuple(span for span in spans if span.end - span.begin > TIME_TOLERANCE)
@@ -319,8 +330,16 @@ def stops_of(path: ClockedPath) -> Array:
 
 
 def ramp_shares(path: ClockedPath) -> Array:
-    """Share of the time of each stretch that a ramp of its time law takes, shape (corners - 1,)."""
-    task, duration = path.task, np.diff(path.corners)
-    if path.pace is not None:
-        return path.pace.ramps
-    return np.full(len(duration), task.time_law.ramp) if task.process is None else task.process.ramp / duration
+    """Shares of the time of each stretch that the ramps of its time law take, shape (corners - 1, 2)."""
+    process, duration = path.task.process, np.diff(path.corners)
+    if path.pace is not None or process is None:
+        shares = np.full(len(duration), path.task.time_law.ramp) if path.pace is None else path.pace.ramps
+        return np.repeat(shares[:, None], 2, axis=1)
+    return ramp_times(process, path.toolpath, len(duration)) / duration[:, None]
+
+
+def ramp_times(process: ProcessEntry, toolpath: Toolpath, count: int) -> Array:
+    """Times in [s] of the ramps at the ends of each of some stretches of a path, shape (count, 2)."""
+    ramps = np.full((count, 2), process.ramp)
+    ramps[0, 0], ramps[-1, 1] = process.ramps(toolpath.runs)
+    return ramps

@@ -28,7 +28,8 @@ def advance(law: TimeLaw, tau: Array, ramp: Array | float | None = None, drops: 
     both ends. Trapezoid: even speeding up and slowing down, each during ``ramp`` of the time, at rest at both ends.
     Steady: likewise, with accelerations that start and end at zero.
 
-    ``ramp`` is the share of the time that a ramp takes, one for all or shape (N,); None for that of the law. ``drops``
+    ``ramp`` is the share of the time that a ramp takes, one for all or shape (N,), or shape (N, 2) where the first and
+    the last one of a steady law differ; None for that of the law. ``drops``
     are the shares of the top speed that a steady law lacks at its begin and at its end, shape (N, 2): 1 at rest, 0
     where there is no ramp; None for rest at both ends.
     """
@@ -44,9 +45,9 @@ def advance(law: TimeLaw, tau: Array, ramp: Array | float | None = None, drops: 
                 acceleration=60.0 * tau * rest * (1.0 - 2.0 * tau),
             )
         case TimeLawKind.TRAPEZOID:
-            return _trapezoid(tau, share)
+            return _trapezoid(tau, _of_ends(share)[0])
         case TimeLawKind.STEADY:
-            return _steady(tau, share, np.ones(2) if drops is None else drops.T)
+            return _steady(tau, _of_ends(share), np.ones(2) if drops is None else drops.T)
 
 
 def peak_rate(law: TimeLaw) -> float:
@@ -80,26 +81,34 @@ def reached_at(law: TimeLaw, share: Array, ramp: Array | float | None = None, dr
     return tau
 
 
-def _steady(tau: Array, ramp: Array | float, drops: Array) -> Advance:
+def _of_ends(ramp: Array | float) -> tuple[Array | float, Array | float]:
+    """Shares of the time of the first ramp and of the last."""
+    return (ramp[:, 0], ramp[:, 1]) if isinstance(ramp, np.ndarray) and ramp.ndim > 1 else (ramp, ramp)
+
+
+def _steady(tau: Array, ramps: tuple[Array | float, Array | float], drops: Array) -> Advance:
     """As a trapezoid, but with the rate ``1 - d + d (3 x^2 - 2 x^3)`` of the top one at a share x of a ramp.
 
     ``drops`` has the d of the first ramp and of the last one, shape (2,) or (2, N).
     """
-    first, last = drops
-    v = 1.0 / (1.0 - 0.5 * (first + last) * ramp)
-    x = np.minimum(np.minimum(tau, 1.0 - tau) / ramp, 1.0)
-    ramps = [(tau < ramp) & (first > 0.0), (1.0 - tau < ramp) & (last > 0.0)]
-    begun, even = v * ramp * x**3 * (1.0 - 0.5 * x), v * ramp * x
-    bend = 6.0 * v / ramp * x * (1.0 - x)
-    grown = v * x * x * (3.0 - 2.0 * x)
+    (first, last), (rise, fall) = drops, ramps
+    v = 1.0 / (1.0 - 0.5 * (first * rise + last * fall))
+    inside = [(tau < rise) & (first > 0.0), (1.0 - tau < fall) & (last > 0.0)]
+    up, down = _ramp(tau, rise, first), _ramp(1.0 - tau, fall, last)
     return Advance(
-        share=np.select(
-            ramps,
-            [first * begun + (1.0 - first) * even, 1.0 - (last * begun + (1.0 - last) * even)],
-            v * (tau - 0.5 * ramp * first),
-        ),
-        rate=np.select(ramps, [first * grown + (1.0 - first) * v, last * grown + (1.0 - last) * v], v),
-        acceleration=np.select(ramps, [first * bend, -last * bend], 0.0),
+        share=np.select(inside, [v * up.share, 1.0 - v * down.share], v * (tau - 0.5 * rise * first)),
+        rate=np.select(inside, [v * up.rate, v * down.rate], v),
+        acceleration=np.select(inside, [v * up.acceleration, -v * down.acceleration], 0.0),
+    )
+
+
+def _ramp(tau: Array, ramp: Array | float, drop: Array) -> Advance:
+    """Speeding up from ``1 - drop`` to a rate of 1 in a ramp, at shares of the time."""
+    x = np.minimum(tau / ramp, 1.0)
+    return Advance(
+        share=ramp * (drop * x**3 * (1.0 - 0.5 * x) + (1.0 - drop) * x),
+        rate=drop * x * x * (3.0 - 2.0 * x) + (1.0 - drop),
+        acceleration=drop * 6.0 / ramp * x * (1.0 - x),
     )
 
 

@@ -35,6 +35,7 @@ class Toolpath:
             projected; None for other curves.
         seam: The seam with its walls by the parameter of the tip curve; None without walls.
         listed: The same by the points and axes that a file lists, where the path was smoothed; else None.
+        runs: Lengths in [m] of its run-in and of its run-out, which belong to it; nil without.
         line: Curve that the tip weaves about, along which length and feed are measured; None where it does not weave.
     """
 
@@ -52,6 +53,7 @@ class Toolpath:
     seam: SeamPlaces | None = None
     line: Curve | None = None
     listed: "Toolpath | None" = None
+    runs: tuple[float, float] = (0.0, 0.0)
 
     def __repr__(self) -> str:
         """One line without arrays."""

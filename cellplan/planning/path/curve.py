@@ -64,6 +64,7 @@ class PathCurve:
         default_factory=dict
     )  # outward normals of walls that a seam line states, by name
     seam: SeamPlaces | None = None  # the seam that the tool follows; None without walls
+    work: Array | None = None  # parameters between which the work is, where runs come before and behind it, shape (2,)
     bulge: float | None = None  # greatest distance in [m] of a smooth curve from its chords, unprojected; else None
 
 

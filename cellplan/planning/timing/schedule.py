@@ -20,7 +20,9 @@ from cellplan.model.task.clocked_path import (
     leaves_at,
     process_spans,
     ramp_shares,
+    ramp_times,
     stops_of,
+    work_span,
 )
 from cellplan.model.task.task import TIME_TOLERANCE, ProgrammedPath, Task
 from cellplan.model.task.time_law import peak_rate, reached_at, stand_off
@@ -62,8 +64,8 @@ def retimed_schedule(schedule: Schedule, clock: Clock) -> Schedule:
     tasks = []
     for path in schedule.paths:
         nominal = _on_clock(clock.sigma, path)
-        nominal_times = [path.task.start, nominal.end, *nominal.cycle_ends, *nominal.stops]
-        start, end, *rest = clock.reached_at(np.array(nominal_times)).tolist()
+        nominal_times = [path.task.start, nominal.end, *nominal.work, *nominal.cycle_ends, *nominal.stops]
+        start, end, begins, ends, *rest = clock.reached_at(np.array(nominal_times)).tolist()
         cycles, demanded = len(nominal.cycle_ends), np.array(nominal.demanded).reshape(-1, 3)
         process_on = clock.reached_at(np.array(nominal.process_on).reshape(-1, 2)).tolist()
         tasks.append(
@@ -78,6 +80,7 @@ def retimed_schedule(schedule: Schedule, clock: Clock) -> Schedule:
                     map(DemandedSpan, *clock.reached_at(demanded[:, :2]).T.tolist(), demanded[:, 2].tolist())
                 ),
                 process_on=tuple((begin, end) for begin, end in process_on),
+                work=(begins, ends),
             )
         )
     return Schedule(times=clock.times, tasks=tuple(tasks), paths=schedule.paths, clock=clock)
@@ -217,6 +220,8 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
         stops=tuple((corners if path.pace is None else stops_of(path)).tolist()),
         demanded=demanded_spans(path),
         process_on=process_spans(path),
+        work=work_span(path),
+        runs=path.toolpath.runs,
     )
 
 
@@ -229,7 +234,7 @@ def _cycle_ends(path: ClockedPath, corners: Array) -> tuple[float, ...]:
         return ()
     shares = np.arange(1, task.repeat + 1) / task.repeat
     if toolpath.runs_on and not toolpath.is_timed:
-        shares = reached_at(task.time_law, shares, float(ramp_shares(path)[0]))
+        shares = reached_at(task.time_law, shares, float(ramp_shares(path)[0, 0]))
     return tuple((corners[0] + shares * (corners[-1] - corners[0])).tolist())
 
 
@@ -254,7 +259,7 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
         return task.start + toolpath.duration * np.arange(task.repeat + 1.0)
     behind = _stops(task, toolpath)
     if task.process is not None:
-        return _at_feed(task, task.process, behind)
+        return _at_feed(task, task.process, toolpath, behind)
     if task.feed is not None:
         return task.start + peak_rate(task.time_law) / task.feed * behind
     duration = task.time_for_path(cell.motion.duration)
@@ -271,26 +276,30 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
     return task.start + duration * (behind / behind[-1])
 
 
-def _at_feed(task: Task, process: ProcessEntry, behind: Array) -> Array:
+def _at_feed(task: Task, process: ProcessEntry, toolpath: Toolpath, behind: Array) -> Array:
     """Times in [s] of the stops of a path with a demanded feed: a ramp takes half of its time for its length."""
-    lengths, least = np.diff(behind), process.feed * process.ramp
-    if lengths.min() < least:
-        key, got, most = "ramp_s", f"{process.ramp:g} s", f"{lengths.min() / process.feed:.3g} s"
+    lengths = np.diff(behind)
+    ramps = ramp_times(process, toolpath, len(lengths))
+    taken, on_work = 0.5 * ramps.sum(axis=1), lengths.copy()
+    on_work[0] -= toolpath.runs[0]
+    on_work[-1] -= toolpath.runs[1]
+    k = int(np.argmin(on_work))
+    if np.any(lengths * (1.0 + STEP_TOLERANCE) < process.feed * taken):
+        most_mm = MM * on_work[k] / (2 - sum(run > 0.0 for run in toolpath.runs))
+        key, got, most = "ramp_s", f"{process.ramp:g} s", f"{2.0 * most_mm / MM / process.feed:.3g} s"
         if process.ramp_mm is not None:
-            key, got, most = "ramp_mm", f"{process.ramp_mm:g} mm", f"{MM * lengths.min() / 2.0:.4g} mm"
-        if any(process.runs):
-            key, other = ("run_in_mm", "run_out_mm") if process.runs[0] else ("run_out_mm", "run_in_mm")
-            raise InputError(
-                f"{task.where(f'process.{key}')}: expected less than half of the path and its run, "
-                f"{MM * lengths.min() / 2.0:.4g} mm, as the ramp at its other end is as long, got "
-                f"{MM * max(process.runs):g} mm; state {other} too, or make it shorter"
-            )
+            key, got, most = "ramp_mm", f"{process.ramp_mm:g} mm", f"{most_mm:.4g} mm"
         raise InputError(
             f"{task.where(f'process.{key}')}: expected ramps that leave the feed of {MM * process.feed:g} mm/s some "
-            f"of each side, got {got} for one of {MM * lengths.min():.4g} mm; round the corners "
+            f"of each side, got {got} for one of {MM * on_work[k]:.4g} mm; round the corners "
             f"(corners: {{blend_mm: 5}}) or make it shorter than {most}"
         )
-    return task.moves_from + np.append(0.0, np.cumsum(lengths / process.feed + process.ramp))
+    if process.lead_s > ramps[0, 0]:
+        raise InputError(
+            f"{task.where('process.lead_s')}: expected at most {ramps[0, 0]:.4g} s, which the tool takes along its "
+            f"run-in, got {process.lead_s:g}; make run_in_mm longer"
+        )
+    return task.moves_from + np.append(0.0, np.cumsum(lengths / process.feed + taken))
 
 
 def _stops(task: Task, toolpath: Toolpath) -> Array:

@@ -136,7 +136,7 @@ class SeamExecution:
         if rows.X_PT is None or rows.feeds is None:
             raise InputError(f"robot '{rows.robot}': expected poses and speeds of the seam of '{seam.task}', got none")
         process = self._frame.cell.task(seam.task).process
-        if process is not None and any(process.runs):
+        if process is not None and any(process.has_runs):
             raise LineRefusedError(
                 seam.task, ": expected no run-in and no run-out, as a program of lines stops where its process begins"
             )

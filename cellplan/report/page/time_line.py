@@ -100,7 +100,8 @@ def _work(task: Task, record: Record, begin: float, end: float) -> Iterator[Span
     if task.settle > 0.0:
         yield Span("settle", "settling: tool errors are not judged", first, first + task.settle)
     if task.process is not None:
-        ends = [first, *(begin + at for rapid in record.get("process_off_s", ()) for at in rapid), off]
+        on, off = (begin + at for at in record["process_on_s"]) if "process_on_s" in record else (first, off)
+        ends = [on, *(begin + at for rapid in record.get("process_off_s", ()) for at in rapid), off]
         for on, until in zip(ends[0::2], ends[1::2], strict=True):
             yield Span("process", f"process of {task.name} on", on, until)
 

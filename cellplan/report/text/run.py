@@ -87,6 +87,7 @@ def _rows(record: Record) -> Iterator[Row]:
     yield from acceleration_rows(record)
     yield from _task_rows(record["tasks"])
     yield from smoothing_rows(record["tasks"])
+    yield from run_rows(record["tasks"])
     yield from feed_rows({name: task.get("greatest_feed") for name, task in record["tasks"].items()})
     yield from _closure_rows(record.get("closure", {}))
     yield from skew_row(record)
@@ -133,6 +134,15 @@ def smoothing_rows(tasks: Record) -> Iterator[Row]:
         position, orientation = smoothing["max_position_error_mm"], smoothing["max_orientation_error_deg"]
         figure = f"{_short(position)} mm, {_short(orientation)} deg"
         yield "error against the file", figure, f"{small(smoothing['max_depth_mm'])} mm into the part, task {name}"
+
+
+def run_rows(tasks: Record) -> Iterator[Row]:
+    """How long the tool runs in and out, and where it comes to its feed, or to rest, on the work."""
+    for name, task in tasks.items():
+        if "run_in_mm" in task:
+            run_in, run_out = task["run_in_mm"], task["run_out_mm"]
+            on_work = "" if run_in and run_out else f"; the tool {'slows down' if run_in else 'speeds up'} on the work"
+            yield "run-in and run-out", f"{small(run_in)} mm and {small(run_out)} mm", f"task {name}{on_work}"
 
 
 def feed_rows(feeds: Record) -> Iterator[Row]:

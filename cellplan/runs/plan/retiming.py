@@ -17,7 +17,7 @@ from cellplan.model.motion.joint_path import JointPath
 from cellplan.model.motion.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.settings.units import si_or_none
-from cellplan.model.task.clocked_path import ClockedPath, fixed_rests, travel_speeds
+from cellplan.model.task.clocked_path import ClockedPath, fixed_rests, run_easing, travel_speeds, work_span
 from cellplan.model.task.task import Task
 from cellplan.planning.timing.fixed_rates import FixedRate
 from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
@@ -87,9 +87,9 @@ class StepErrors:
         cell, chains = self._scene.cell, self._scene.chains
         by_robot = {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots}
         X_WP = part_poses(cell, chains, by_robot)
-        closure = cell.checks.closure_mm.si, cell.checks.closure_deg.si
-        relations: list[tuple[Relation, Array, tuple[float, float]]] = [
-            *((path.task, path.poses(sigma), path.task.tolerance.between) for path in self._paths),
+        closure = np.array([cell.checks.closure_mm.si, cell.checks.closure_deg.si])
+        relations: list[tuple[Relation, Array, Array]] = [
+            *((path.task, path.poses(sigma), _allowed(path, sigma)) for path in self._paths),
             *((grasp, grasp.X_PT[None], closure) for grasp in cell.closures),
         ]
         worst = np.zeros(len(sigma))
@@ -98,6 +98,13 @@ class StepErrors:
             shares = error_lengths(relative_to_task_frame(relation, X_WT, X_WP), desired, relation) / allowed
             worst = np.maximum(worst, shares.max(axis=1))
         return worst
+
+
+def _allowed(path: ClockedPath, sigma: Array) -> Array:
+    """Largest errors of a tool between rows in [m] and [rad] at nominal times in [s], shape (N, 2)."""
+    easing = run_easing(path.task, (path.start, path.end), work_span(path), sigma)
+    position, orientation = path.task.tolerance.between
+    return np.stack([position / easing, np.full(len(sigma), orientation)], axis=1)
 
 
 def retimed(

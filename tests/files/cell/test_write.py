@@ -115,16 +115,16 @@ def test_every_kind_of_entry_survives_being_written(load: Load, tmp_path: Path, 
 
 
 def test_a_usual_ramp_is_written_as_if_it_were_stated(load: Load) -> None:
-    usual, stated, with_run_in = (
+    usual, stated, with_runs = (
         written_document(load(("tool_axis: normal", f"tool_axis: normal\n    process: {{feed_mm_s: 8{more}}}")))[
             "tasks"
         ]
-        for more in ("", ", ramp_s: 0.1", ", run_in_mm: 5")
+        for more in ("", ", ramp_s: 0.1", ", run_in_mm: 5, run_out_mm: 5")
     )
 
     assert yaml_text(usual) == yaml_text(stated)
     assert all("ramp_s" in task["process"] for task in usual.values())
-    assert not any("ramp_s" in task["process"] for task in with_run_in.values())
+    assert not any("ramp_s" in task["process"] for task in with_runs.values())
 
 
 def test_planar_work_keeps_its_made_up_tool_axis(load: Load, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from cellplan.model.cell.layout import ChoiceKind, VariableKind
 from cellplan.model.units import DEG, MM
 from cellplan.runs.greatest_feeds import open_feeds
 from cellplan.runs.overrides import with_overrides
+from cellplan.runs.run_lengths import refuse_open_runs
 from cellplan.search.programs.objective import CycleTiming, Objective
 from cellplan.search.synchronous import refuse_other_jobs, refuse_other_methods
 
@@ -52,6 +53,7 @@ def searched_cell(request: LayoutRequest) -> Cell:
     _refuse_margins(changed)
     _refuse_misplacement(request, changed)
     _refuse_open_feeds(request, changed)
+    refuse_open_runs(changed, "a layout search")
     return changed
 
 

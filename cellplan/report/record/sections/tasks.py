@@ -94,6 +94,14 @@ class RapidsRecord(TypedDict, total=False):
     process_off_s: Annotated[list[list[Number]], "begin and end of each rapid move along the path: the process is off"]
 
 
+class RunsRecord(TypedDict, total=False):
+    """Only of a path with runs, which are in its length."""
+
+    run_in_mm: Annotated[Number, "length of the run-in, with its arc and its slope"]
+    run_out_mm: Annotated[Number, "length of the run-out, likewise"]
+    process_on_s: Annotated[list[Number], "times between which the process is on"]
+
+
 class TiltRecord(TypedDict, total=False):
     """Only of a tool whose axis may lean; its orientation errors count from the cone on."""
 
@@ -126,6 +134,7 @@ class TaskRecord(
     StandoffRecord,
     DirectionRecord,
     RapidsRecord,
+    RunsRecord,
     TiltRecord,
     GreatestRecord,
     SmoothedRecord,
@@ -205,6 +214,7 @@ def _task_record(
         "start_s": number(accuracy.start_s),
         "end_s": number(accuracy.end_s),
         **_rapids_record(accuracy),
+        **_runs_record(accuracy),
         **_tilt_record(accuracy, task),
         **_greatest_record(report, task),
         **smoothed_record(accuracy.listed, task),
@@ -221,6 +231,14 @@ def _rapids_record(accuracy: TaskAccuracy) -> RapidsRecord:
     """When the process of a task is off along its path; nothing where it is on throughout."""
     off = [[number(begin), number(end)] for begin, end in accuracy.process_off]
     return {"process_off_s": off} if off else {}
+
+
+def _runs_record(accuracy: TaskAccuracy) -> RunsRecord:
+    """Runs of a path, and when its process is on; nothing without."""
+    if not any(accuracy.runs):
+        return {}
+    run_in, run_out = (number(MM * run) for run in accuracy.runs)
+    return {"run_in_mm": run_in, "run_out_mm": run_out, "process_on_s": [number(at) for at in accuracy.process_on]}
 
 
 def _greatest_record(report: Report, task: Task) -> GreatestRecord:
