@@ -34,7 +34,9 @@ def standoffs(cell: Cell, schedule: Schedule, chains: Chains, q: RobotRows) -> t
         if task.relative_to is not Frame.PART:
             continue
         rows = np.flatnonzero((times >= max(task.start, task.judged_from)) & (times <= scheduled.end + task.off_delay))
-        spans = scheduled.process_on if len(scheduled.process_on) > 1 else (scheduled.work,)
+        lead = 0.0 if task.process is None else task.process.lead_s
+        several = tuple((on + lead, off + lead) for on, off in scheduled.process_on)
+        spans = several if len(several) > 1 else (scheduled.work,)
         if len(spans) > 1 or any(scheduled.runs):
             rows = rows[are_within(times[rows], spans)]
         rows = rows if len(rows) else np.array([len(times) - 1])

@@ -148,7 +148,7 @@ def with_run_lengths(
         shares = _shares(result[1])
         for run in runs:
             if not run.is_settled:
-                run.note(shares.get((run.task.name, run.is_first), 0.0))
+                run.note(shares.get((run.task.name, run.is_first), 1.0))
         if all(run.is_settled for run in runs) and stated_lengths(runs) == lengths:
             break
     for run in runs:

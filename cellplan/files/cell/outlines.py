@@ -8,6 +8,7 @@ from typing import Final, cast
 import numpy as np
 
 from cellplan.errors import InputError
+from cellplan.files.cell.outline_runs import with_run_points
 from cellplan.files.cell.paths.csv_table import METRES_PER_MM
 from cellplan.files.cell.paths.dxf import DrawingSettings, FlatDrawing, read_drawing, require_dxf
 from cellplan.files.cell.referenced_files import Sources
@@ -18,7 +19,7 @@ from cellplan.files.schema.partial import ValidEntries
 from cellplan.files.schema.programmed import OutlineEntry
 from cellplan.files.schema.task import TaskEntry
 from cellplan.files.shapes import centred_solid, direction
-from cellplan.geometry.arrays import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.curves.flat_curves import Contour, begun_near
 from cellplan.geometry.curves.placed_contours import SURFACE, Ground, drawing_pose, place_contours
 from cellplan.geometry.curves.seam_line import SeamAngles, SeamLine, tool_targets
@@ -27,6 +28,8 @@ from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.step.outlines import FaceError, Outline, PlacedOutline, place_on_step
 from cellplan.geometry.step.part import StepPart
 from cellplan.guard import Guard, in_child
+from cellplan.model.settings.runs import AUTO
+from cellplan.model.settings.task import ProcessEntry
 from cellplan.model.settings.units import Deg, Mm, in_si
 from cellplan.model.task.task import ProgrammedPath
 
@@ -45,6 +48,10 @@ def outline_paths(valid: ValidEntries, sources: Sources, part: StepPart | None) 
         if task.process is not None and task.process.has_open_feed:
             text = "expected a number above 0 in mm/s for an outline, whose feed is not sought"
             sources.findings.append(sources.document.finding(("tasks", name, "process", "feed_mm_s"), text))
+        for key in ("run_in_mm", "run_out_mm") if task.process is not None else ():
+            if getattr(task.process, key) == AUTO:
+                text = "expected a length in mm for an outline, got auto"
+                sources.findings.append(sources.document.finding(("tasks", name, "process", key), text))
         stated = task.path.outline
         entry = stated if isinstance(stated, OutlineEntry) else OutlineEntry(file=stated or "")
         place = sources.file(entry.file, (*where, "outline", *(() if isinstance(stated, str) else ("file",))))
@@ -129,14 +136,17 @@ def _programmed(placed: PlacedOutline, entry: OutlineEntry, task: TaskEntry) -> 
         standoff=(path.standoff_mm or Mm(0.0)).si,
     )
     lines = placed.lines if entry.order == "file" else _by_distance(placed.lines)
-    targets = [_targets_along(line, angles, entry) for line in lines]
-    height = max(float((points @ placed.direction).max()) for points, _ in targets) + entry.lift_mm.si
-    points, axes, rapid = [targets[0][0]], [targets[0][1]], [np.zeros(len(targets[0][0]) - 1, dtype=bool)]
-    for (before, held), (after, next_held) in pairwise(targets):
+    process = ProcessEntry() if task.process is None else task.process
+    targets = [_with_runs(line, angles, entry, process) for line in lines]
+    height = max(float((points @ placed.direction).max()) for points, *_ in targets) + entry.lift_mm.si
+    points, axes, runs = [targets[0][0]], [targets[0][1]], [targets[0][2]]
+    rapid = [np.zeros(len(runs[0]), dtype=bool)]
+    for (before, held, _), (after, next_held, is_run) in pairwise(targets):
         ends = np.stack([before[-1], after[0]])
         points += [ends + (height - ends @ placed.direction)[:, None] * placed.direction, after]
         axes += [np.stack([held[-1], next_held[0]]), next_held]
         rapid += [np.ones(3, dtype=bool), np.zeros(len(after) - 1, dtype=bool)]
+        runs += [np.zeros(3, dtype=bool), is_run]
     is_rapid = np.concatenate(rapid)
     feed = 0.0 if task.process is None else task.process.feed
     return ProgrammedPath(
@@ -148,9 +158,18 @@ def _programmed(placed: PlacedOutline, entry: OutlineEntry, task: TaskEntry) -> 
         is_closed=False,
         speeds=np.where(is_rapid, entry.transfer_mm_s.si, feed),
         is_rapid=is_rapid,
+        is_run=np.concatenate(runs) if any(process.has_runs) else None,
         rounding=entry.rounding_mm.si,
         stop_angle=entry.stop_deg.si,
     )
+
+
+def _with_runs(
+    line: SeamLine, angles: SeamAngles, entry: OutlineEntry, process: ProcessEntry
+) -> tuple[Array, Array, Flags]:
+    """Tool tips and axes along a line with the runs of its process, and which sides these are."""
+    points, axes = _targets_along(line, angles, entry)
+    return with_run_points(points, axes, line.tangents[[0, -1]], runs=process, chord=entry.chord_mm.si)
 
 
 def _by_distance(lines: Sequence[SeamLine]) -> list[SeamLine]:

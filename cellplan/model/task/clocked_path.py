@@ -261,10 +261,10 @@ def process_spans(path: ClockedPath) -> Spans:
         lead = 0.0 if task.process is None else task.process.lead_s
         begin, end = work_span(path)
         return ((begin - lead, end - lead),)
-    edges = np.flatnonzero(np.diff(pace.is_on.astype(np.int8))) + 1  # off and on in turns
-    inner = corners[edges].tolist()
-    ends = [task.start, *inner, path.end + task.off_delay]
-    return tuple(zip(ends[0::2], ends[1::2], strict=True))
+    edges = np.flatnonzero(np.diff(pace.is_on.astype(np.int8), prepend=0, append=0))  # on and off in turns
+    ends = np.concatenate([[task.start], corners[1:-1], [path.end + task.off_delay]])[edges]
+    ends -= 0.0 if task.process is None else task.process.lead_s
+    return tuple(zip(ends[0::2].tolist(), ends[1::2].tolist(), strict=True))
 
 
 def work_span(path: ClockedPath) -> tuple[float, float]:

@@ -102,6 +102,7 @@ class ProgrammedPath(SampledPath):
 
     speeds: Array  # speed of each side in [m/s]: the feed of the file, or the stated one of rapids, shape (N - 1,)
     is_rapid: Flags  # whether the process is off on each side, shape (N - 1,)
+    is_run: Flags | None = None  # whether each side is a run to the work or from it, the process off; None for no side
     rounding: float  # largest distance in [m] of a rounded corner from the sides
     stop_angle: float  # change of direction in [rad] from which on a corner is a stop
 
@@ -114,6 +115,11 @@ class ProgrammedPath(SampledPath):
     def feeds(self) -> Array:
         """Different feeds of the process in [m/s], increasing."""
         return np.unique(self.speeds[~self.is_rapid])
+
+    @property
+    def is_on(self) -> Flags:
+        """Whether the process is on on each side, shape (N - 1,)."""
+        return ~self.is_rapid if self.is_run is None else ~(self.is_rapid | self.is_run)
 
     @property
     def holds_one_feed(self) -> bool:

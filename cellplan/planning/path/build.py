@@ -89,7 +89,7 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
         is_timed=is_timed,
         bulge=curve.bulge,
         seam=seam,
-        runs=_runs(curve, arc),
+        runs=_runs(task, curve, arc),
     )
     if not is_rigid(toolpath.spread(PROBES)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")
@@ -101,10 +101,12 @@ def _outline(task: Task) -> PathCurve:
     return programmed_curve(task.path) if isinstance(task.path, ProgrammedPath) else path_curve(task)
 
 
-def _runs(path: PathCurve, arc: ArcLength) -> tuple[float, float]:
+def _runs(task: Task, path: PathCurve, arc: ArcLength) -> tuple[float, float]:
     """Lengths in [m] of the run-in and of the run-out, lifted or not; nil where there is none."""
     ends = path.stops[[0, -1]]
     work = ends if path.work is None else path.work
+    if isinstance(task.path, ProgrammedPath) and task.path.is_run is not None:
+        work = path.given[np.flatnonzero(~task.path.is_run)[[0, -1]] + [0, 1]]
     begin, end = arc.lengths(work).tolist()
     return begin if work[0] > ends[0] else 0.0, arc.total - end if work[1] < ends[1] else 0.0
 

@@ -24,6 +24,8 @@ def with_runs(task: Task, path: PathCurve, orientation: Orientation) -> tuple[Pa
     if task.process is None or not any(task.process.has_runs):
         return path, orientation
     where = task.where(f"process.{task.process.run_key}")
+    if isinstance(task.path, ProgrammedPath) and task.path.is_run is not None:
+        return path, orientation  # an outline has its runs among its sides
     if isinstance(task.path, ProgrammedPath):
         raise InputError(
             f"{where}: expected none along a path with rapids and stops of its own, on which the tool begins at rest; "

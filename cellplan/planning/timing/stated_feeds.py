@@ -17,8 +17,9 @@ def pace_of(task: Task, path: ProgrammedPath, toolpath: Toolpath) -> tuple[Array
     r"""Speeds of a path whose file states feeds.
 
     A stretch ends at each stop and where the feed changes. It is passed at its feed ``f`` but for the ramps at its
-    ends, each of which takes the time ``r``, from a speed ``a`` and to a speed ``b``: zero at stops, else the slower
-    one of both feeds, so that a slower feed holds on all of its stretch. With the length ``L`` it takes
+    ends, each of which takes the time ``r``, on a run that of all its length, from a speed ``a`` and to a speed ``b``:
+    zero at stops, else the slower one of both feeds, so that a slower feed holds on all of its stretch. With the length
+    ``L`` it takes
 
     .. math:: T = L/f + r (1 - a/f)/2 + r (1 - b/f)/2
 
@@ -29,11 +30,14 @@ def pace_of(task: Task, path: ProgrammedPath, toolpath: Toolpath) -> tuple[Array
         Times in [s] between the stretches, shape (S + 1,), lengths of path in [m] behind these, and their speeds.
     """
     process = task.process or ProcessEntry()
-    given, ramp = chord_lengths(path.listed.points), process.ramp
+    given, ramp = chord_lengths(path.listed.points), np.asarray(process.ramp)
     is_stop = np.isin(given, toolpath.stops)
-    nodes = np.flatnonzero(is_stop | np.append(False, np.append(np.diff(path.speeds) != 0.0, False)))
-    behind, feeds, is_on = toolpath.arc.lengths(given[nodes]), path.speeds[nodes[:-1]], ~path.is_rapid[nodes[:-1]]
+    changes = (np.diff(path.speeds) != 0.0) | np.diff(path.is_on)
+    nodes = np.flatnonzero(is_stop | np.append(False, np.append(changes, False)))
+    behind, feeds, is_on = toolpath.arc.lengths(given[nodes]), path.speeds[nodes[:-1]], path.is_on[nodes[:-1]]
     lengths = np.diff(behind)
+    if path.is_run is not None:
+        ramp = np.where(path.is_run[nodes[:-1]], 2.0 * lengths / feeds, ramp)
     slower = np.append(feeds[0], np.append(np.minimum(feeds[:-1], feeds[1:]), feeds[-1]))
     ends = np.where(is_stop[nodes], 0.0, slower)
     while True:

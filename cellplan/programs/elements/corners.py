@@ -19,8 +19,8 @@ def may_round(program: ProgramRows, units: Collection[Sequence[str]] = ()) -> di
     """Rows that targets may round, by robot, shape (N,).
 
     These are all rows but the first and the last one, marks, rows at which the process of any robot of the program goes
-    on or off, and rows at which a robot rests or its tool has to stop. Robots of a unit, which move in step, round the
-    same rows: those that none of the moving ones must not round.
+    on or off unless they end a line of that robot, and rows at which a robot rests or its tool has to stop. Robots of a
+    unit, which move in step, round the same rows: those that none of the moving ones must not round.
     """
     switch_times = _switch_times(program)
     flags = {}
@@ -28,7 +28,7 @@ def may_round(program: ProgramRows, units: Collection[Sequence[str]] = ()) -> di
         free = np.ones(len(rows), dtype=bool)
         free[[0, -1, *rows.marks, *rows.stops]] = False
         is_switch = switches(rows) if rows.times is None else are_near(rows.times, switch_times, SAME_TIME)
-        flags[name] = free & ~is_switch
+        flags[name] = free & (~is_switch | (switches(rows) & rows.on_seam))  # there its rounding says whether it stops
     result = dict[str, Flags]()
     for unit in units or [[name] for name in flags]:
         moving = {name: moves(program.robots[name]) for name in unit}

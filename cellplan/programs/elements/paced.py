@@ -17,7 +17,7 @@ from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, 
 from cellplan.model.units import MM
 from cellplan.programs.elements.corners import row_shares
 from cellplan.programs.elements.handshake import HandshakeStep, first_steps, handshake_steps
-from cellplan.programs.elements.process import ProcessForm
+from cellplan.programs.elements.process import ProcessForm, switches_in_motion
 
 Which = Literal["on", "inner", "off"]
 Refuse = Callable[[str, str | None], NoReturn]  # raises that something is expected, and what is there instead
@@ -142,6 +142,10 @@ class Events:
                 return switches
         return None
 
+    def moves_on(self, task: str | None, on: bool) -> bool:
+        """Whether the tool goes on where the process of a task begins, or ends."""
+        return task is not None and switches_in_motion(self.frame.cell, task, on=on)
+
     def _is_on_motion(self, task: str | None, on: bool) -> bool:
         """Whether the motion to the first or last point of a task itself says that its process begins or ends."""
         form = self.form
@@ -169,7 +173,8 @@ def moves_of(job: ExportJob, program: ProgramRows, events: Events) -> tuple[Move
         which: Which | None = None
         if has_process and (before or (after and on_seam[row])):
             which = "on" if not before else "inner" if after else "off"
-        if which == "inner" and seam is not None and zone <= 0.0:
+        is_passed = which == "inner" or (seam is not None and which and events.moves_on(seam.task, which == "on"))
+        if is_passed and seam is not None and zone <= 0.0:
             raise LineRefusedError(
                 seam.task,
                 f": row {row + 1}: a corner in process that no zone within its tolerance rounds would be a stop, which "
@@ -318,7 +323,8 @@ class _RowsOfMoves:
             move.refuse("a rounded row, as a stop ends its process", None)
         if (off and not is_on) or (on and is_on):
             move.refuse(f"a process that is {'on' if off else 'off'} before", "the other")
-        is_stop = off or on or switches.waits or not self._rows
+        at_end = [end for end, is_switched in ((False, off), (True, on)) if is_switched]
+        is_stop = not all(self._events.moves_on(move.task, end) for end in at_end) or switches.waits or not self._rows
         if is_stop and (move.zone > 0.0 or move.share > 0.0):
             move.refuse("a stop where a process goes on or off, robots wait or a program begins", "a rounded row")
         self._take(move)

@@ -93,6 +93,18 @@ class ProcessForm:
         return (*_read(self, on=True, data=data), *_read(self, on=False, data=data))
 
 
+def switches_in_motion(cell: Cell, name: str, *, on: bool) -> bool:
+    """Whether the process of a task begins, or ends, while its tool goes on along a run.
+
+    Motions then switch its outputs themselves, or the controller switches none.
+    """
+    task = cell.task(name)
+    control = cell.robot(task.robot).control
+    form = None if control is None else ProcessForm.of(cell.controllers[control.id])
+    has_run = task.process is not None and task.process.has_runs[0 if on else 1]
+    return has_run and (form is None or form.entry.lead(on=on) > 0.0)
+
+
 def shared_outputs(cell: Cell, tasks: Sequence[str]) -> Iterator[InputError]:
     """Outputs that one of some tasks, which are done at once, would switch off while another one needs them."""
     used: dict[tuple[str, str], str] = {}

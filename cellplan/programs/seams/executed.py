@@ -27,7 +27,7 @@ from cellplan.programs.elements.corners import row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.elements.frames import part_pose
 from cellplan.programs.elements.joints import Axes, in_step
-from cellplan.programs.elements.process import ProcessForm
+from cellplan.programs.elements.process import ProcessForm, switches_in_motion
 from cellplan.programs.rows.part_targets import POSE_TOL, solved_joints, tip_jacobians
 from cellplan.programs.rows.rows import times_of
 from cellplan.programs.seams.shapes import LARGEST_ARC, STANDS, Shape, arc, corner_cut, line
@@ -135,11 +135,7 @@ class SeamExecution:
         rows = self._rows
         if rows.X_PT is None or rows.feeds is None:
             raise InputError(f"robot '{rows.robot}': expected poses and speeds of the seam of '{seam.task}', got none")
-        process = self._frame.cell.task(seam.task).process
-        if process is not None and any(process.has_runs):
-            raise LineRefusedError(
-                seam.task, ": expected no run-in and no run-out, as a program of lines stops where its process begins"
-            )
+        self._require_motion(seam)
         X, travelled, q = self._on_part(seam, q_entry[None])[0], 0.0, q_entry
         first = seam.first
         paths: list[tuple[int, SeamPath]] = []
@@ -160,6 +156,19 @@ class SeamExecution:
                 self._require_configuration(seam, row, q_there[None], MM * (travelled + share * shape.length))
             X, travelled, q, first = end, travelled + shape.length, path.q[-1], last
         yield from self._with_corners(seam, paths)
+
+    def _require_motion(self, seam: Seam) -> None:
+        """The tool goes on along its runs where its process is switched."""
+        cell = self._frame.cell
+        process, control = cell.task(seam.task).process, self._robot.control
+        for on, key in ((True, "on_lead_s"), (False, "off_lead_s")):
+            has_run = process is not None and process.has_runs[0 if on else 1]
+            if has_run and control is not None and not switches_in_motion(cell, seam.task, on=on):
+                raise LineRefusedError(
+                    seam.task,
+                    f": expected controllers.{control.id}.process.{key} above 0, by which the motion itself switches "
+                    "the outputs beside a run, got 0: the tool would stop there; or write joints (--moves joints)",
+                )
 
     def _on_part(self, seam: Seam, q: Array) -> Array:
         """Poses of the tool in the frame of a seam, shape (N, 4, 4), for joints of shape (N, m)."""

@@ -115,13 +115,14 @@ def depths_on_paths(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> list[Check
 
 
 def _at_work(task: Task, toolpath: Toolpath) -> Array:
-    """Tool poses along a path, shape (N, 4, 4), without those on its rapids."""
-    poses = toolpath.spread(POSES)
+    """Tool poses along a path, shape (N, 4, 4), without those on its rapids and runs."""
+    poses, s = toolpath.spread(POSES), np.linspace(0.0, toolpath.length, POSES)
     if not isinstance(task.path, ProgrammedPath):
-        return poses
+        run_in, run_out = toolpath.runs
+        return poses[(s >= run_in) & (s <= toolpath.length - run_out)]
     behind = toolpath.arc.lengths(chord_lengths(task.path.points))
-    sides = np.searchsorted(behind, np.linspace(0.0, toolpath.length, POSES), side="right") - 1
-    return poses[~task.path.is_rapid[np.minimum(sides, len(task.path.is_rapid) - 1)]]
+    sides = np.searchsorted(behind, s, side="right") - 1
+    return poses[task.path.is_on[np.minimum(sides, len(task.path.is_on) - 1)]]
 
 
 def _on_part(cell: Cell, name: str) -> bool:

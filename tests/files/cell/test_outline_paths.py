@@ -13,8 +13,10 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
 from cellplan.errors import InputError
 from cellplan.files.cell.load import load_cell
 from cellplan.geometry.transforms import pose
+from cellplan.model.task.clocked_path import ClockedPath, demanded_spans, process_spans, work_span
 from cellplan.model.task.task import ProgrammedPath
 from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import clock_path
 
 STEP = "step: {file: part.step}"
 BALL = "geometry: {sphere: {radius_mm: 80}}"
@@ -215,15 +217,60 @@ def test_an_outline_is_no_path_of_tacks(folder: Path) -> None:
         load_cell(folder / "tacks.yaml")
 
 
-def test_an_outline_has_no_run_in_as_the_tool_begins_at_rest(folder: Path) -> None:
-    text = CELL.replace("PART", STEP).replace("feed_mm_s: 20", "feed_mm_s: 20, run_in_mm: 5")
+RUNS = "run_in_mm: 8, run_out_mm: 5, run_arc_mm: 6, run_arc_side: right"
+
+
+def with_runs(folder: Path, contours: str, more: str = RUNS) -> ClockedPath:
+    text = CELL.replace("PART", STEP).replace("feed_mm_s: 20", f"feed_mm_s: 20, {more}")
     (folder / "runs.yaml").write_text(
-        text.replace("PATH", "outline: {file: logo.dxf, contours: [1]}, layer: CUT, on: F2")
+        text.replace("PATH", f"outline: {{file: logo.dxf, contours: {contours}}}, layer: CUT, on: F2")
     )
     cell = load_cell(folder / "runs.yaml")
+    task = cell.task("cut")
+    return clock_path(cell, task, build_toolpath(task, cell.part))
 
-    with pytest.raises(InputError, match=r"tasks\.cut\.process\.run_in_mm: expected none along a path with rapids"):
-        build_toolpath(cell.task("cut"), cell.part)
+
+def test_a_closed_contour_begins_and_ends_on_quarter_circles_at_its_feed(folder: Path) -> None:
+    path = with_runs(folder, "[1]")
+    (begin, end), length = work_span(path), 0.5 * np.pi * 0.006
+    runs = path.toolpath.runs
+
+    assert runs == pytest.approx((0.008 + length, 0.005 + length), rel=5e-3)  # chords of the arcs
+    assert process_spans(path) == ((pytest.approx(begin), pytest.approx(end)),)
+    assert begin - path.start == pytest.approx(2.0 * runs[0] / 0.02)
+    X_PT, V_PT_P, _ = path.targets(np.linspace(begin, end, 500))
+    assert np.allclose(np.linalg.norm(V_PT_P[:, :3], axis=1), 0.02, rtol=1e-9)
+    ends, twists = (values[[0, -1], :3] for values in (X_PT[:, :, 3], V_PT_P))
+    along = twists / 0.02
+    assert np.allclose(ends[0], ends[1], atol=1e-6)
+    assert along[0] @ along[1] > np.cos(np.deg2rad(10.0))  # no corner, but for the chords of a circle
+    right = np.cross(along, X_PT[0, :3, 2] * -1.0)
+    outer = path.targets(np.array([path.start, path.end]))[0][:, :3, 3]
+    for k, (straight, sign) in enumerate(((0.008, -1.0), (0.005, 1.0))):
+        off = outer[k] - ends[k]
+        assert (off @ along[k], off @ right[k]) == pytest.approx((sign * 0.006, 0.006 + straight), abs=1.2e-3)
+
+
+def test_every_contour_has_its_runs_with_rapids_between_them(folder: Path) -> None:
+    path = with_runs(folder, "[1, 2, 3]", "run_in_mm: 4, run_out_mm: 3, lead_s: 0.05")
+
+    spans = process_spans(path)
+
+    lengths = [2.0 * np.pi * 0.01, 2.0 * (0.02 + 0.015), 0.015]
+    assert len(spans) == 3
+    stops = [0, 3, 0]  # sharp corners of the rectangle, each with two ramps of 0.1 s
+    for (on, off), length, corners in zip(spans, lengths, stops, strict=True):
+        assert off - on == pytest.approx(length / 0.02 + 0.1 * corners, rel=2e-3)
+    tips = path.targets(np.array([span[0] + 0.05 for span in spans]))[0][:, :3, 3]
+    assert tips[:, 2] == pytest.approx(tips[0, 2])
+    assert [span.feed for span in demanded_spans(path)] == [0.02] * len(demanded_spans(path))
+
+
+def test_an_outline_needs_lengths_of_its_runs(folder: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"tasks\.cut\.process\.run_in_mm: expected a length in mm for an outline, got"
+    ):
+        with_runs(folder, "[1]", "run_in_mm: auto")
 
 
 def test_a_face_of_a_part_that_comes_from_no_step_file_is_refused(folder: Path) -> None:

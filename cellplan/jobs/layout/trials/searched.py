@@ -110,7 +110,7 @@ def _refuse_open_feeds(request: LayoutRequest, cell: Cell) -> None:
         if process is not None and not process.scales and not cell.program.is_home_to_home:
             raise InputError(
                 f"{feed.task.where('process.ramp_s')}: expected ramp_mm where the greatest feed is sought over a "
-                "layout, as all motion must scale with the feed; write process: {ramp_mm: 20} or run_in_mm"
+                "layout, as all motion must scale with the feed; write process: {ramp_mm: 20} or both runs"
             )
 
 
