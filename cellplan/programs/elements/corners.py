@@ -6,8 +6,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
+from cellplan.model.cell.cell import Cell
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows
 from cellplan.programs.elements.joints import Axes, in_step
+from cellplan.programs.elements.process import switches_in_motion
 from cellplan.programs.elements.timed_rows import are_near
 
 LARGEST_SHARE: Final = 0.5  # [-] controllers cut zones to half of a segment
@@ -88,6 +90,13 @@ def switches(rows: RobotRows) -> Flags:
     if rows.process is not None:
         flags[1:] = rows.process[1:] != rows.process[:-1]
     return flags
+
+
+def stops_at(cell: Cell, task: str, rows: RobotRows, row: int) -> bool:
+    """Whether a tool stops at a row of its task: robots wait, or its process is switched where no run goes on."""
+    if row in rows.marks or rows.process is None or not switches(rows)[row]:
+        return row in rows.marks
+    return not switches_in_motion(cell, task, on=bool(rows.process[row]))
 
 
 def _switch_times(program: ProgramRows) -> Array:

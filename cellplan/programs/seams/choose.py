@@ -12,9 +12,8 @@ from cellplan.geometry.transforms import Array, inverse, rotation_vector
 from cellplan.measures.tool_errors import error_lengths, part_poses
 from cellplan.model.report.exported import ExportJob, ProgramRows, RobotRows, Seam
 from cellplan.model.task.task import Frame, Task
-from cellplan.programs.elements.corners import LARGEST_SHARE, switches, units_of
+from cellplan.programs.elements.corners import LARGEST_SHARE, stops_at, switches, units_of
 from cellplan.programs.elements.joints import Axes, in_step
-from cellplan.programs.elements.process import switches_in_motion
 from cellplan.programs.rows.part_targets import LEFT_OVER
 from cellplan.programs.rows.rows import EssentialRows, WorkRows, times_of
 from cellplan.programs.rows.thin import bends, chosen_rows
@@ -241,15 +240,9 @@ class _SeamRows:
             for row, pose in points.items():
                 self.poses[row], self.feeds[row], self.rounding[row] = pose, feed, 0.0
         for row, share in zip(ends[1:-1], _cuts(path, pieces), strict=True):
-            self.rounding[first + row] = 0.0 if self._is_stop(path.task, first + row) else share
+            is_stop = stops_at(self.scene.cell, path.task.name, self.rows, first + row)
+            self.rounding[first + row] = 0.0 if is_stop else share
         self.seams.append((path.task.name, first, last))
-
-    def _is_stop(self, task: Task, row: int) -> bool:
-        """Whether a tool stops at a row: robots wait, or its process is switched where no run goes on."""
-        if row in self.rows.marks or self.rows.process is None:
-            return row in self.rows.marks
-        is_on = bool(self.rows.process[row])
-        return bool(switches(self.rows)[row]) and not switches_in_motion(self.scene.cell, task.name, on=is_on)
 
     def switch_off(self, first: int, last: int) -> None:
         """No process is on between two rows, where nothing that controllers know as a seam begins it."""

@@ -20,7 +20,7 @@ import numpy as np
 
 from cellplan.errors import InputError, LineRefusedError, NotVerifiedError
 from cellplan.geometry.transforms import Array, inverse, rotation_vector
-from cellplan.model.cell.cell import Robot
+from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows, Seam
 from cellplan.model.units import DEG, MM
 from cellplan.programs.elements.corners import row_shares
@@ -135,7 +135,7 @@ class SeamExecution:
         rows = self._rows
         if rows.X_PT is None or rows.feeds is None:
             raise InputError(f"robot '{rows.robot}': expected poses and speeds of the seam of '{seam.task}', got none")
-        self._require_motion(seam)
+        _require_motion(self._frame.cell, self._robot, seam.task)
         X, travelled, q = self._on_part(seam, q_entry[None])[0], 0.0, q_entry
         first = seam.first
         paths: list[tuple[int, SeamPath]] = []
@@ -156,19 +156,6 @@ class SeamExecution:
                 self._require_configuration(seam, row, q_there[None], MM * (travelled + share * shape.length))
             X, travelled, q, first = end, travelled + shape.length, path.q[-1], last
         yield from self._with_corners(seam, paths)
-
-    def _require_motion(self, seam: Seam) -> None:
-        """The tool goes on along its runs where its process is switched."""
-        cell = self._frame.cell
-        process, control = cell.task(seam.task).process, self._robot.control
-        for on, key in ((True, "on_lead_s"), (False, "off_lead_s")):
-            has_run = process is not None and process.has_runs[0 if on else 1]
-            if has_run and control is not None and not switches_in_motion(cell, seam.task, on=on):
-                raise LineRefusedError(
-                    seam.task,
-                    f": expected controllers.{control.id}.process.{key} above 0, by which the motion itself switches "
-                    "the outputs beside a run, got 0: the tool would stop there; or write joints (--moves joints)",
-                )
 
     def _on_part(self, seam: Seam, q: Array) -> Array:
         """Poses of the tool in the frame of a seam, shape (N, 4, 4), for joints of shape (N, m)."""
@@ -312,6 +299,19 @@ class SeamExecution:
         X = X_WP @ inverse(X_WP[0]) @ X_WT
         turns = rotation_vector(X[:, :3, :3] @ X_WT[:3, :3].T)
         return off, np.array([float(np.linalg.norm(v, axis=1).sum()) for v in (X[:, :3, 3] - X_WT[:3, 3], turns)])
+
+
+def _require_motion(cell: Cell, robot: Robot, task: str) -> None:
+    """The tool goes on along its runs where its process is switched."""
+    process, control = cell.task(task).process, robot.control
+    for on, key in ((True, "on_lead_s"), (False, "off_lead_s")):
+        has_run = process is not None and process.has_runs[0 if on else 1]
+        if has_run and control is not None and not switches_in_motion(cell, task, on=on):
+            raise LineRefusedError(
+                task,
+                f": expected controllers.{control.id}.process.{key} above 0, by which the motion itself switches the "
+                "outputs beside a run, got 0: the tool would stop there; or write joints (--moves joints)",
+            )
 
 
 def _require_reached(robot: Robot, seam: Seam, q: Array, misses: Array, places: Array) -> None:
