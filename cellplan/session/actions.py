@@ -1,7 +1,7 @@
 """Actions of a session that take longer than an answer: work in other processes, and what it offers."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from cellplan.errors import InputError
 from cellplan.report.record.common import Record
@@ -10,14 +10,28 @@ from cellplan.session.work import KINDS, Works
 from cellplan.session.works.request import request_of
 
 
+class Certificate(NamedTuple):
+    """What certifying a state has come to."""
+
+    values: Mapping[str, object]  # of the state, as far as they differ from the file, by address
+    passed: bool
+    text: str  # the verdict in one line
+
+
 class Actions:
-    """Work on the cell of a document; the first of it starts the processes."""
+    """Work on the cell of a document; the first of it starts the processes.
+
+    Attributes:
+        certificate: The last one of a state, until the file is another one.
+    """
 
     def __init__(self, document: Document) -> None:
         """Begin without work."""
         self._document = document
         self._works: Works | None = None
         self._noted = list[Record]()  # events that were not asked for yet
+        self.certificate: Certificate | None = None
+        self._certifying: Mapping[str, object] | None = None  # values of the state that is being certified
         self._offers = list[Mapping[str, object]]()  # values of trials and remedies, by their numbers
 
     def get_ready(self) -> Works:
@@ -41,7 +55,7 @@ class Actions:
         cell, works = self._document.cell, self.get_ready()
         arguments: tuple[object, ...]
         if kind == "certify":
-            arguments = (cell, version)
+            arguments, self._certifying = (cell, version), {**self._document.changes.values}
         elif kind == "map":
             operators = [cell.index(task.robot) for task in cell.tasks if task.robot not in cell.positioners]
             number = argument if argument is not None else next(iter(operators), 0)
@@ -69,6 +83,21 @@ class Actions:
             raise InputError(f"take: expected a number below {len(self._offers)}, got {place:g}")
         return self._offers[int(place)]
 
+    def follow(self, action: str, before: Mapping[str, object]) -> None:
+        """Let certificates go with their states: saved, a state has no changes; of another file they say nothing.
+
+        Args:
+            action: What was done to the file.
+            before: What was changed until then, by address.
+        """
+        if action != "save":
+            self.certificate = self._certifying = None
+            return
+        after, certificate = {**self._document.changes.values}, self.certificate
+        self._certifying = after if self._certifying == before else self._certifying
+        if certificate is not None and certificate.values == before:
+            self.certificate = certificate._replace(values=after)
+
     def note(self, event: Record | None) -> None:
         """Let an event be among the next ones; nothing for None."""
         self._noted += [] if event is None else [event]
@@ -76,7 +105,13 @@ class Actions:
     def events(self) -> list[Record]:
         """Events since the last call; what is offered has a number to take it by."""
         noted, self._noted = self._noted, []
-        return [*noted, *(self._numbered(event) for event in (self._works.poll() if self._works else ()))]
+        events = self._works.poll() if self._works else []
+        for event in events:
+            if event["event"] == "verdict" and self._certifying is not None:
+                failed = next((line.strip() for line in event["lines"] if "FAILED" in line), event["lines"][0])
+                text = "every check passed" if event["passed"] else failed
+                self.certificate = Certificate(self._certifying, event["passed"], text)
+        return [*noted, *(self._numbered(event) for event in events)]
 
     def close(self) -> None:
         """End all work and all processes."""

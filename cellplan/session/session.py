@@ -8,7 +8,7 @@ from typing import Final, Self
 from cellplan.errors import InputError
 from cellplan.report.record.common import Record
 from cellplan.session.actions import Actions
-from cellplan.session.answer import CERTIFIED, PLANNED
+from cellplan.session.answer import CERTIFIED, FAILS, PLANNED
 from cellplan.session.document import Document
 from cellplan.session.engine import Engine
 from cellplan.session.starts import ADDRESS
@@ -44,7 +44,6 @@ class Session:
         """Use ``open``."""
         self.document, self._engine, self._number = document, Engine(document.given), 0
         self._actions = Actions(document)
-        self._certified: Mapping[str, object] | None = None  # values of the last certified state
 
     @classmethod
     def open(cls, cell: Path, *, settings: Iterable[str] = (), allow_dirs: Sequence[Path] = ()) -> Self:
@@ -114,7 +113,10 @@ class Session:
             "keep": document.keep,
         }
         if action in values:
+            before = changes.values
             actions.note(values[action]())
+            if action in {"save", "reload", "keep"}:
+                actions.follow(action, before)
             self._engine = _restored(self._engine, document)
         elif action in {"stop", "end"}:
             (actions.stop if action == "stop" else self.close)()
@@ -126,20 +128,24 @@ class Session:
         """What has happened in the background since it was asked last; it never waits."""
         events, is_new = self._actions.events(), False
         for event in events:
-            if event["event"] == "verdict" and event["passed"] and event["version"] == self._engine.version:
-                self._certified, is_new = {**self.document.changes.values}, True
-                self._engine.hold()
+            if event["event"] == "verdict":
+                is_new = True
+                if event["passed"] and event["version"] == self._engine.version:
+                    self._engine.hold()
         if (seen := self.document.look()) is not None:
             events.append(seen)
             if seen["state"] == "changed":
                 self._engine, is_new = _restored(self._engine, self.document), True
+                self._actions.follow("changed", {})
         return [*events, *([{"event": "answer", "answer": self.answer()}] if is_new else [])]
 
     def answer(self) -> Record:
         """What is known of the present values."""
         document, record = self.document, self._engine.record()
-        if record["state"] == PLANNED and self._certified == document.changes.values:
-            record = {**record, "state": CERTIFIED, "verdict": f"{CERTIFIED}: every check passed"}
+        certificate = self._actions.certificate
+        if certificate is not None and certificate.values == document.changes.values:
+            state = CERTIFIED if certificate.passed else FAILS if record["state"] == PLANNED else record["state"]
+            record = {**record, "state": state, "verdict": f"{state}: {certificate.text}"}
         can = {"undo": document.changes.can_undo, "redo": document.changes.can_redo, "save": bool(document.history)}
         return {
             "number": self._number,
