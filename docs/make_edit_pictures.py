@@ -36,7 +36,7 @@ def main() -> None:
             browser.run("app.camera.look('oblique'); await drawn();")
             shoot(browser, "certified.png")
             place = "robots.kuka.base.y_mm"
-            browser.run(f"app.switchTheme(); app.change({{ '{place}': app.desired['{place}'] + 250 }});")
+            browser.run(f"app.switchTheme(); app.change({{ '{place}': app.desired['{place}'] + 80 }});")
             settled(browser)
             shoot(browser, "moved.png")
 

@@ -197,7 +197,7 @@ def test_certified_holds_until_the_next_change_and_its_state_stays_as_a_ghost(pa
         ("✓ certified", "certified", False),
         ("○ planned", "planned", True),
     ]
-    assert "all checks of solve passed" in page.text("outcome")
+    assert page.text("outcome").startswith("of the state before the last change:certified: all checks of solve passed")
 
 
 def test_a_job_that_breaks_off_is_red_with_the_time_to_which_it_gets(page: Browser) -> None:

@@ -25,6 +25,7 @@ class LiveApp extends App {
       }));
     }
     this.setRecord(record);
+    if (!this.isSlow && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.player.play();
   }
 
   /** Show another cell, or the same one read again. */
@@ -47,14 +48,14 @@ class LiveApp extends App {
   async reopen() {
     await this.client.guarded(async () => {
       const record = await this.client.record("/open", {});
-      const { camera } = this;
-      const before = camera.place;
+      const { azimuth, elevation, distance, target } = this.camera;
       this.record = viewOf(record);
       this.stage = new Stage(this.record);
       this.open();
       this.setScene(0);
       this.setRecord(record);
-      camera.goTo(before);
+      Object.assign(this.camera, { azimuth, elevation, distance, target });
+      this.turned();
     });
   }
 
@@ -65,6 +66,7 @@ class LiveApp extends App {
     this.answer = answer;
     const isBusy = this.client.isSending && this.client.waiting;
     this.desired = isBusy || this.handles.held ? { ...answer.values, ...this.desired } : { ...answer.values };
+    this.outcome.age(answer.version);
     this.pose(answer);
     if (answer.state === "certified") this.overlay.keepGhost(answer);
     this.bases.update(this.desired);

@@ -12,6 +12,7 @@ class Outcome {
   constructor(app) {
     this.app = app;
     this.rows = new Map(); // of progress, by work
+    this.judged = null; // version of the state that a shown verdict is of
   }
 
   take(event) {
@@ -65,11 +66,20 @@ class Outcome {
     byId("stop").disabled = this.rows.size === 0;
   }
 
-  verdict({ passed, lines }) {
+  verdict({ passed, lines, version }) {
     this.done("certify");
     this.clear();
+    this.judged = version;
     this.say(passed ? "certified: all checks of solve passed" : "not certified: checks of solve failed", passed ? "good" : "mark");
-    lines.forEach((line) => this.say(line));
+    this.say(lines.join("\n"), "lines");
+  }
+
+  /** A verdict is that of one state: after a change it is marked as an older one. */
+  age(version) {
+    if (this.judged === null || version <= this.judged) return;
+    this.judged = null;
+    byId("outcome").prepend(element("li", { textContent: "of the state before the last change:" }));
+    byId("outcome").classList.add("old");
   }
 
   remedies(remedies) {
@@ -93,7 +103,9 @@ class Outcome {
   }
 
   clear() {
+    this.judged = null;
     byId("outcome").replaceChildren();
+    byId("outcome").classList.remove("old");
   }
 
   file({ state, text }) {
