@@ -66,21 +66,25 @@ class Look:
     @property
     def words(self) -> str:
         """What becomes of it, in one line."""
-        known, motion = self.judgement, self.motion
-        if known is not None and known.lost:
-            return known.lost
-        if known is None and motion.lost_at is not None:
+        if self.judgement is not None:
+            return self._words_at_rest(self.judgement)
+        motion = self.motion
+        if motion.lost_at is not None:
             lost = f"a tool loses its path at {motion.lost_at:.3f} s"
             return motion.why or (lost if motion.is_begun else "the start of a path is out of reach")
-        if known is not None and known.lines:
+        missed = [figure.words for figure in self.figures if not figure.is_met]
+        return "; ".join(missed) or "all limits are kept at the nodes"
+
+    def _words_at_rest(self, known: Judgement) -> str:
+        """The same of what is known at rest."""
+        if known.lines:
             more = f" (and {len(known.lines) - 1} more)" if len(known.lines) > 1 else ""
             return f"{known.lines[0]}{more}"
-        missed = [figure.words for figure in self.figures if not figure.is_met]
-        if known is None and missed:
-            return "; ".join(missed)
-        if known is not None and known.is_done:
+        if known.lost or not known.is_done:
+            return known.lost or "all limits are kept at the rows"
+        if self.block.is_alone:
             return "all checks pass on a coarser clock; certify proves it on that of the cell"
-        return "all limits are kept at the nodes"
+        return "all checks of this block pass on a coarser clock; certify judges the whole program"
 
     @property
     def record(self) -> Record:

@@ -54,6 +54,11 @@ class Block:
         return tuple(self.stage.phase.tasks)
 
     @property
+    def is_alone(self) -> bool:
+        """Whether it is the whole job."""
+        return len(self.tasks) == len(self.cell.tasks) and not self.cell.program.is_home_to_home
+
+    @property
     def cell(self) -> Cell:
         """The cell meanwhile."""
         return self.stage.cell

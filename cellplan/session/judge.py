@@ -15,9 +15,10 @@ import numpy as np
 from cellplan.certify.certify import certify
 from cellplan.certify.run_pairs import scene_of_run, with_straight_move
 from cellplan.checks.clearance.mounting import check_mounting
-from cellplan.checks.clearance.phase_ends import JudgedPhase
+from cellplan.checks.clearance.phase_ends import JudgedPhase, with_phase_ends
+from cellplan.checks.joints.joins import with_joins
 from cellplan.checks.task_rules import with_task_rules
-from cellplan.checks.verify import verify_motion
+from cellplan.checks.verify import verify_motion, with_clocks
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.view.write import placed_scene
@@ -81,9 +82,15 @@ def judged(cell: Cell, block: Block, first: Scene) -> Iterator[Judgement]:
         if unclear:
             break
         yield known
-    reports = with_task_rules(cell, [phase], [phase.report]) if _is_single(cell) else [phase.report]
+    reports = _of_program_rules(cell, phase) if _is_single(cell) else [phase.report]
     lines = (*_failed(reports), *([unclear] if unclear else ()))
     yield replace(known, is_done=True, is_clear=not unclear, lines=lines)
+
+
+def _of_program_rules(cell: Cell, phase: JudgedPhase) -> list[Report]:
+    """The report of the only phase with what is judged of clocks, of its ends and of all tasks together."""
+    timed = replace(phase, report=with_clocks(phase.report, phase.scene, phase.schedule, is_reported=False))
+    return list(with_task_rules(cell, [timed], with_joins(cell, with_phase_ends(cell, [timed]))))
 
 
 def reason(cell: Cell, error: Exception) -> str:
