@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from live_verdicts import drags
 
 from cellplan import edit, load_cell, solve
 from cellplan.errors import InputError
@@ -263,3 +264,11 @@ def test_positions_of_a_weld_and_its_push_are_in_the_figures() -> None:
     assert [it.value for it in figures if it.name == "push"] == pytest.approx(
         [0.0] * len(welds), abs=1e-3
     )  # accuracy of the nodes
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["two_robots", "four_robots_initial"])
+def test_settled_verdicts_are_those_of_solve(name: str) -> None:
+    for drag in drags(name, 5):
+        assert drag.is_agreed, drag
+        assert drag.is_small, drag
