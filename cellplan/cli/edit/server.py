@@ -171,8 +171,9 @@ class Server:
                 is_open = not events.has_ended
                 await self._send(writer, events.take() or b"\n")
         finally:
-            gone.cancel()
             self._streams.discard(events)
+            gone.cancel()
+            await asyncio.wait({gone}, timeout=self._limits.linger_s)  # until it has left the reader to others
 
     async def _send(self, writer: StreamWriter, data: bytes) -> None:
         """Write, and wait until the client has taken it."""

@@ -4,6 +4,7 @@ import asyncio
 import json
 import threading
 import time
+from contextlib import ExitStack
 from typing import Any
 
 import pytest
@@ -109,6 +110,15 @@ def test_the_end_is_said_to_every_tab_and_streams_end() -> None:
         assert next(first) == next(second) == {"event": "end", "text": "ended in the page"}
         status, _, body = page.post("/open")
         assert (status, body) == (503, b'{"error":"the session has ended"}')
+
+
+def test_streams_end_with_the_server_and_without_a_word_in_its_log(caplog: pytest.LogCaptureFixture) -> None:
+    with ExitStack() as opened:
+        with served() as page:
+            streams = [opened.enter_context(page.events()) for _ in range(2)]
+
+        assert [list(stream) for stream in streams] == 2 * [[{"event": "end", "text": "the test is over"}]]
+    assert caplog.records == []
 
 
 @pytest.mark.parametrize("tab", [-1, 1.5, "1", True])
