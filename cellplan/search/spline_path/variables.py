@@ -49,10 +49,9 @@ class PathVariables:
 
     @classmethod
     def of_null_space(cls, cell: Cell, robots: tuple[str, ...], given: JointSpline) -> "PathVariables":
-        """Those of motion in the null space, of which changes alone count: the first configuration is zero."""
-        most = np.full(given.coefficients.shape, FARTHEST)
-        most[0] = 0.0
-        return cls(**_common(cell, robots, "null_space", given), lower=-most.ravel(), upper=most.ravel())
+        """Those of motion in the null space."""
+        most = np.full(given.coefficients.size, FARTHEST)
+        return cls(**_common(cell, robots, "null_space", given), lower=-most, upper=most)
 
     def spline(self, x: Array) -> JointSpline:
         """The spline at values of the variables, shape (n,)."""

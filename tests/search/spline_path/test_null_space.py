@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cellplan import LayoutRequest, load_cell, solve
+from cellplan import LayoutRequest, Stop, load_cell, search_layout, solve
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.layout.trials.prepared import PreparedSearch, prepared
 from cellplan.planning.plan_motion import plan_motion
@@ -128,3 +128,23 @@ def test_what_the_cell_states_is_solved_and_written(tmp_path: Path) -> None:
     assert solution.passed
     q = 1e3 * solution.motion.q
     np.testing.assert_allclose(q[-1], [-500.0 + 30.0, -500.0 - 30.0], atol=1e-6)  # half of what is asked moves no tool
+
+
+@pytest.mark.slow
+def test_a_motion_that_was_searched_passes_and_is_searched_further(tmp_path: Path) -> None:
+    tolerance = "tasks.circle.tolerance={position_mm: 2, orientation_deg: 2}"
+    settings = (tolerance, "motion.duration_s=2", "motion.step_s=0.02")
+    request = LayoutRequest(cell=FOUR.parent / "planar_pair.yaml", settings=settings, free=("path",))
+
+    record = search_layout(request, tmp_path / "study", stop=Stop(trials=1)).record
+
+    best = tmp_path / "study" / "best.yaml"
+    solution, again = solve(load_cell(best)), prepared(LayoutRequest(cell=best, free=("path",)))
+    point = again.coarse.evaluate(again.coarse.given, again.given_start)
+    assert record["status"] == "certified"
+    assert record["best"] is not None
+    assert record["given"]["cycle_s"] is not None
+    assert record["best"]["cycle_s"] < record["given"]["cycle_s"]
+    assert solution.passed
+    assert point is not None
+    np.testing.assert_allclose(point.q[-1], solution.motion.q[-1], atol=1e-3)

@@ -11,7 +11,7 @@ from cellplan.files.cell.changes import read_setting
 from cellplan.files.cell.load import load_cell
 from cellplan.files.input.findings import did_you_mean, listed, shown
 from cellplan.jobs.layout.request import LayoutRequest
-from cellplan.model.cell.cell import Cell, Relation, Robot, Timing
+from cellplan.model.cell.cell import Cell, Mode, Relation, Robot, Timing
 from cellplan.model.cell.layout import ChoiceKind, VariableKind
 from cellplan.model.units import DEG, MM
 from cellplan.runs.greatest_feeds import open_feeds
@@ -63,6 +63,11 @@ def refuse_unsearchable(request: LayoutRequest, cell: Cell) -> None:
     if not cell.program.is_home_to_home:
         paths = () if layout is None else [path.robot for path in layout.paths]
         refuse_other_jobs(cell, "a layout search", paths=paths)
+        if motion.mode is not Mode.SIMULTANEOUS and layout is not None and (layout.paths or layout.null_space):
+            raise InputError(
+                f"{at('motion.mode')}: expected simultaneous where joint paths may change, got '{motion.mode}': choose "
+                "it, or leave path and null_space out"
+            )
         return
     refuse_other_methods(replace(cell, motion=replace(motion, timing=Timing.AS_WRITTEN)), "a layout search")
     if motion.timing is Timing.CYCLE:

@@ -61,6 +61,13 @@ def test_a_path_and_motion_in_the_null_space_are_one_line() -> None:
         searched_cell(request)
 
 
+def test_joint_paths_of_a_part_at_rest_are_one_line() -> None:
+    request = LayoutRequest(cell=FOUR, settings=("motion.mode=part_at_rest",), free=("path",))
+
+    with pytest.raises(InputError, match=r"motion\.mode: expected simultaneous where joint paths may change"):
+        searched_cell(request)
+
+
 def test_another_word_is_one_line() -> None:
     with pytest.raises(InputError, match=r"^--free: expected some of .*path.*, got 'paht', did you mean 'path'"):
         freed(load_cell(FOUR), ["paht"])
