@@ -114,7 +114,11 @@ def test_a_given_layout_without_motion_says_why_as_solve_does(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("free", ["spin"], r"cell\.yaml:\d+: tasks\.ring\.free: expected no free spin for --free path: .*got \[spin\]"),
+        (
+            "free",
+            ["spin"],
+            r"cell\.yaml:\d+: tasks\.ring\.free: expected no free spin for a joint path: .*got \[spin\]",
+        ),
         (
             "axes",
             ["x", "y", "z", "rx", "ry"],
@@ -126,8 +130,9 @@ def test_a_joint_path_beside_open_components_is_refused_before_the_search(
     tmp_path: Path, key: str, value: list[str], message: str
 ) -> None:
     text = (CELLS / "two_robots.yaml").read_text()
-    name = next(task.name for task in load_cell(CELLS / "two_robots.yaml").tasks)
+    cell = load_cell(CELLS / "two_robots.yaml")
+    name = next(task.name for task in cell.tasks)
     (tmp_path / "cell.yaml").write_text(text.replace(f"  {name}:\n", f"  ring:\n    {key}: [{', '.join(value)}]\n", 1))
 
     with pytest.raises(InputError, match=message):
-        prepared(LayoutRequest(cell=tmp_path / "cell.yaml", free=("path",)))
+        prepared(LayoutRequest(cell=tmp_path / "cell.yaml", vary=(f"{cell.positioners[0]}.path",)))

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from cellplan.search.misplacement.robust import Robust, RobustSearch
 
 NODES: Final = 129  # [-] of the finish, or more where trials need more
+LED_NODES: Final = 257  # [-] likewise of motion in the null space, which makes peaks between fewer of them
 FINISH: Final = Effort(iterations=25, keys=25, trust=0.2)  # of a layout that is nearly at its best
 FINER: Final = (2, 4)  # [-] times as many nodes of a program whose tools lose their paths
 DENSER: Final = (LayoutProblem, NullSpaceProblem)  # problems that can have more nodes about some times
@@ -195,7 +196,8 @@ class Finish:
 
     def _certified(self, trial: int, x: Array, start: Array) -> CandidateResult:
         """See ``certified``; the cell is made ready with the choices of the trial."""
-        refinement = _Refinement(nodes=nodes_of(self.ready, x, start, NODES))
+        fewest = NODES if self.ready.variables.settings.null_space is None else LED_NODES
+        refinement = _Refinement(nodes=nodes_of(self.ready, x, start, fewest))
         for solves in count(1):
             timed = self._refined(x, start, refinement, is_first=solves == 1)
             x, start, program, reason = timed.x, timed.start, timed.program, timed.reason

@@ -49,7 +49,7 @@ def searched_cell(request: LayoutRequest) -> Cell:
     paths = () if changed.layout is None else changed.layout.paths
     refuse_unsearchable(request, changed)
     if paths:
-        _refuse_open_tasks(changed, purpose="--free path" if request.free else "layout.vary: a joint path")
+        _refuse_open_tasks(changed)
     _refuse_margins(changed)
     _refuse_misplacement(request, changed)
     _refuse_open_feeds(request, changed)
@@ -119,21 +119,20 @@ def _refuse_open_feeds(request: LayoutRequest, cell: Cell) -> None:
             )
 
 
-def _refuse_open_tasks(cell: Cell, *, purpose: str) -> None:
+def _refuse_open_tasks(cell: Cell) -> None:
     """Refuse open components, and robots without just six joints, where a joint path of the positioner is searched."""
     for task in cell.tasks:
         robot = cell.robot(task.robot)
-        why = f"for {purpose}: the joints of '{robot.name}' would not follow from the path of the positioner"
+        why = f"for a joint path: the joints of '{robot.name}' would not follow from the path of the positioner"
+        cure = "vary null_space in place of path"
         if task.is_spin_free:
-            raise InputError(f"{task.where('free')}: expected no free spin {why}, got [spin]; leave free or path out")
+            raise InputError(f"{task.where('free')}: expected no free spin {why}, got [spin]; {cure}")
         if len(task.axes) < 6:
-            raise InputError(
-                f"{task.where('axes')}: expected all six components {why}, got {len(task.axes)}; leave axes or path out"
-            )
+            raise InputError(f"{task.where('axes')}: expected all six components {why}, got {len(task.axes)}; {cure}")
         if len(robot.model.joints) != 6:
             raise InputError(
                 f"{cell.origin.at(f'robots.{robot.name}')}: expected six joints {why}, got "
-                f"{len(robot.model.joints)}; leave path out"
+                f"{len(robot.model.joints)}; {cure}"
             )
 
 
