@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.home_to_home import PICK_AND_PLACE
 from builders.three_feeds import THREE_FEEDS, approached
 
 from cellplan import Cell, Solution, load_cell, solve
@@ -113,6 +114,21 @@ def test_the_greatest_feed_holds_in_the_rows_of_a_retimed_program_too(tmp_path: 
 
     assert solution.passed
     assert answers(solution)["ring"].greatest >= answers(solution)["ring"].feed
+
+
+@pytest.mark.slow
+def test_blocks_of_a_program_have_feeds_of_their_own(tmp_path: Path) -> None:
+    process = "process: {feed_mm_s: greatest, ramp_mm: 20}\n    standoff_mm: [0, 5000]\n    path: {"
+    text = PICK_AND_PLACE.replace("path: {", process).replace("duration_s: 3, ", "")
+
+    solution = solve(cell_of(tmp_path, text))
+
+    assert solution.passed
+    assert {run.phase.name for run in solution.runs if run.report.greatest_feeds} == {"work-1", "work-2"}
+    feeds = answers(solution)
+    assert len({feed.feed for feed in feeds.values()}) == 2
+    for feed in feeds.values():
+        assert feed.feed <= feed.greatest <= 1.002 * feed.feed
 
 
 @pytest.mark.slow
