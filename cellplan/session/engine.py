@@ -22,6 +22,7 @@ from cellplan.session.judge import Judgement, judged, reason
 from cellplan.session.motion import follow, of_rows
 from cellplan.session.starts import as_given, started, stated_start, written_starts
 
+ADVISED_EVERY: Final = 4  # [-] changes: between them the advice is that of a layout close by
 SAME_START: Final = 1e-3  # [rad] or [m] within which a start that is written is the one that a motion has
 
 
@@ -47,6 +48,7 @@ class Engine:
         self._bodies = {body.name: body.X_BS for body in self.given.scene.bodies}
         self._obstacles, self.version = dict[str, float](), version
         self._looks = dict[int, Look]()
+        self._advice, self._advised = list[Record](), 0
         self.move({})
 
     def move(self, values: Mapping[str, float], block: int | None = None) -> None:
@@ -58,12 +60,14 @@ class Engine:
         if block is not None and not 0 <= block < len(self.given.blocks):
             raise InputError(f"block: expected a number below {len(self.given.blocks)}, got {block}")
         self._place_obstacles({it: value for it, value in values.items() if self.given.variables.is_of_obstacle(it)})
-        self.shown, self.values = self.shown if block is None else block, {**values}
-        self.version, self._advice, self._is_settled = self.version + 1, list[Record](), False
+        before, self.shown, self.values = self.shown, self.shown if block is None else block, {**values}
+        self.version, self._is_settled = self.version + 1, False
         self._pending: Iterator[None] | None = None  # what is still to be found out at rest
         self._x = self._live.variables.numbers(values)
         last, shown = self._looks.get(self.shown), self._live.blocks[self.shown]
         self._looks = {self.shown: Look.at(shown, follow(shown, self._x, None if last is None else last.motion))}
+        if last is None or self.shown != before or self.version >= self._advised + ADVISED_EVERY:
+            self._advise()
 
     def restore(self, cell: Cell) -> None:
         """Work out the shown block at the values of a changed cell, whose robots begin as it says."""
@@ -113,21 +117,27 @@ class Engine:
         return not was_settled
 
     def _settling(self, cell: Cell) -> Iterator[None]:
-        """Piece by piece: the shown block, the others, what would help."""
+        """Piece by piece: what would help, the other blocks, the judgement of the shown one."""
         look = self._looks[self.shown]
+        self._advise()
+        yield None
+        for place, block in enumerate(self._live.blocks):
+            if place not in self._looks:
+                self._looks[place] = Look.at(block, follow(block, self._x))
+                yield None
         begun = started(cell, look.motion.q[0]) if look.motion.is_begun else cell
         for judgement in judged(begun, look.block, self.given.scene):
             if not look.motion.is_followed and len(judgement.q):
                 look = Look.at(look.block, of_rows(self._x, judgement.times, judgement.q))
             look = self._looks[self.shown] = look.judged(judgement)
             yield None
-        for place, block in enumerate(self._live.blocks):
-            if place not in self._looks:
-                self._looks[place] = Look.at(block, follow(block, self._x))
-                yield None
-        self._advice = advice(look, self._live.variables)
+        self._advise()
         self._is_settled = True
         yield None
+
+    def _advise(self) -> None:
+        """Say what would help the shown block as it is now."""
+        self._advice, self._advised = advice(self._looks[self.shown], self._live.variables), self.version
 
     def record(self) -> Record:
         """What is known of the present values."""
