@@ -76,18 +76,15 @@ class Engine:
         look = self._looks[self.shown]
         stated = stated_start(cell, look.block)
         if np.abs(look.motion.q[0] - stated).max() > SAME_START:
-            self._begin({self.shown: stated})
+            self.given, self._live = _begun({self.shown: stated}, self.given, self._live)
             self._looks.clear()
             self.move(self.values)
 
     def hold(self) -> None:
         """Let later motions begin on the branches of the present ones: they are certified."""
         motions = {place: look.motion for place, look in self._looks.items() if look.motion.is_begun}
-        self._begin({place: motion.q[0] for place, motion in motions.items()})
-
-    def _begin(self, starts: Mapping[int, Array]) -> None:
-        """Let blocks begin elsewhere, at stacked joint positions in [rad] or [m], shape (nq,), by their numbers."""
-        self.given, self._live = (_begun(live, starts) for live in (self.given, self._live))
+        starts = {place: motion.q[0] for place, motion in motions.items()}
+        self.given, self._live = _begun(starts, self.given, self._live)
 
     def starts(self) -> dict[str, object]:
         """Where robots begin in the shown block, by address; as the file says where nothing else was changed."""
@@ -172,7 +169,8 @@ class Engine:
             self._obstacles = {**values}
 
 
-def _begun(live: LiveCell, starts: Mapping[int, Array]) -> LiveCell:
-    """A live cell whose blocks begin elsewhere, by their numbers."""
-    blocks = (replace(block, start=starts.get(place, block.start)) for place, block in enumerate(live.blocks))
-    return replace(live, blocks=tuple(blocks))
+def _begun(starts: Mapping[int, Array], *cells: LiveCell) -> Iterator[LiveCell]:
+    """Live cells whose blocks begin elsewhere, at stacked joint positions in [rad] or [m], (nq,), by their numbers."""
+    for live in cells:
+        blocks = (replace(block, start=starts.get(place, block.start)) for place, block in enumerate(live.blocks))
+        yield replace(live, blocks=tuple(blocks))
