@@ -43,7 +43,7 @@ def advice(look: Look, variables: LiveVariables) -> list[Record]:
     standing = standing_of(problem, motion.point(), demands, Effort(also_at=tuple(times)))
     linear = Linear.of(problem, standing.measures)
     program = LinearProgram.of(linear, demands, Effort().reserve, TRUST if is_missed else SMALL)
-    by_variable = {key: _finite(values) for key, values in effects(standing, np.ones(len(motion.x))).items()}
+    by_variable = {key: _finite(values) for key, values in effects(standing, np.ones(len(motion.x)), linear).items()}
     records = list[Record]()
     for robot, base in enumerate(look.block.cell.robots):
         columns = _columns(variables, base.name)

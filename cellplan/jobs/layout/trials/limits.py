@@ -15,6 +15,7 @@ from cellplan.search.programs.explain import explain
 from cellplan.search.programs.measures import Measures
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point, PointDerivatives, Problem
+from cellplan.search.programs.rows import Linear
 
 NEAR_ANGLE: Final = np.radians(0.5)  # [rad] above the demand at which a margin binds
 TOUCHING: Final = 1e-9  # [m] bodies of which less is demanded may touch
@@ -177,15 +178,20 @@ def standing_of(problem: Problem, point: Point, demands: Demands, effort: Any) -
     return Standing(problem=problem, measures=Measures.of(problem, point, demands, effort), demands=demands)
 
 
-def effects(standing: Standing, steps: Array) -> dict[str, list[float | None]]:
-    """Effects of a step of each variable, shape (n,): on cycle in [s], smallest margin in [deg], clearance in [mm]."""
-    problem, measures = standing.problem, standing.measures
-    by = problem.derivatives(measures.point)
+def effects(standing: Standing, steps: Array, linear: Linear | None = None) -> dict[str, list[float | None]]:
+    """Effects of a step of each variable, shape (n,): on cycle in [s], smallest margin in [deg], clearance in [mm].
+
+    Args:
+        linear: The derivatives at that point, where they are known.
+    """
+    problem = standing.problem
+    linear = linear or Linear.of(problem, standing.measures)
+    by = linear.derivatives
     span = float(problem.times[-1] - problem.times[0])
     return {
         "cycle_s": _listed((span * _of_factor(standing, by) + _of_transfers(standing, by)) * steps),
         "margin_deg": _listed(_of_margin(standing, by) * DEG * steps),
-        "clearance_mm": _listed(_of_distance(standing, by) * MM * steps),
+        "clearance_mm": _listed(_of_distance(standing, linear) * MM * steps),
     }
 
 
@@ -226,14 +232,14 @@ def _of_margin(standing: Standing, by: PointDerivatives) -> Array:
     return _highest(lower, by.q, ones, seen[0]) if is_lower else -_highest(upper, by.q, ones, seen[1])
 
 
-def _of_distance(standing: Standing, by: PointDerivatives) -> Array:
+def _of_distance(standing: Standing, linear: Linear) -> Array:
     """Derivatives of the smallest distance of bodies that do not belong to one robot."""
     distances = standing.measures.distances
     if not len(distances.values) or distances.within_robot.all():
-        return np.full(by.q.shape[-1], np.nan)
+        return np.full(linear.derivatives.q.shape[-1], np.nan)
     values = np.where(distances.within_robot, np.inf, distances.values - distances.demands)
-    derivatives: Array = standing.problem.distance_derivatives(standing.measures.point, distances, by)
-    return derivatives[int(values.argmin())]
+    by_variable: Array = linear.distances[int(values.argmin())]
+    return by_variable
 
 
 def _highest(crests: PeakValues, by: Array, limits: Array, values: Array) -> Array:
