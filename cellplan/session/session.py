@@ -180,5 +180,11 @@ def _restored(engine: Engine, document: Document) -> Engine:
     }
     if others != engine.others or document.given is not engine.origin:
         engine = Engine(document.given, others, engine.shown, engine.version)
-    engine.restore(document.cell)
+    try:
+        engine.restore(document.cell)
+    except InputError as error:  # the values do not go together, as before a change that was undone
+        values = document.changes.values
+        numbers = {it: value for it, value in values.items() if isinstance(value, int | float) and variables.at(it)}
+        engine.move(numbers)
+        engine.refuse(error)
     return engine

@@ -10,9 +10,10 @@ from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.cell.layout import LayoutSettings, VariableKind, VaryRange
+from cellplan.model.cell.mounting import Hanger, Pedestal
 from cellplan.model.robot.robot import start_keys
 from cellplan.model.units import DEG, MM
-from cellplan.search.variables.pedestals import leaving_columns
+from cellplan.search.variables.pedestals import MOST_LEAN, leaving_columns
 from cellplan.search.variables.state import State
 from cellplan.search.variables.ties import Tied
 from cellplan.search.variables.variables import Variables
@@ -20,11 +21,12 @@ from cellplan.search.variables.written import written_number
 from cellplan.session.variable import Variable
 
 POSE: Final = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")
+LEANING: Final = (3, 4)  # places of its roll and pitch
 ROD: Final = ("length_mm", "tilt_deg", "roll_deg")
 FAR: Final = 5.0  # [m] to either side of a position without a range of its cell
 TURN: Final = 2.0 * np.pi  # [rad] to either side of an angle likewise
 LONGEST_ROD: Final = 2.0  # [m]
-SHORTEST_ROD: Final = 0.001  # [m]
+SHORTEST_ROD: Final = 0.001  # [m] of a rod between its round ends
 MOST_TILT: Final = np.radians(170.0)  # [rad] of a rod
 STEP_MM: Final = 10.0  # of one press of a key
 STEP_DEG: Final = 1.0
@@ -154,11 +156,22 @@ def _bounded(cell: Cell, variable: VaryRange, stated: Mapping[str, VaryRange]) -
         joint = cell.robot(variable.name).model.joints[variable.index]
         lower, upper = max(joint.lower, given - TURN), min(joint.upper, given + TURN)
     elif variable.kind is VariableKind.TOOL and variable.index < 2:
-        lower, upper = (SHORTEST_ROD, LONGEST_ROD) if variable.index == 0 else (-MOST_TILT, MOST_TILT)
+        lower, upper = (0.0, LONGEST_ROD) if variable.index == 0 else (-MOST_TILT, MOST_TILT)
+    elif _is_tilt(variable) and isinstance(cell.robot(variable.name).pedestal, Pedestal | Hanger):
+        level = np.pi * np.round(given / np.pi)  # upright, or upside down
+        lower, upper = level - MOST_LEAN, level + MOST_LEAN
     else:
         wide = TURN if variable.is_angle else FAR
         lower, upper = given - wide, given + wide
+    rod = cell.robot(variable.name).tool.rod if variable.kind is VariableKind.TOOL else None
+    if rod is not None and variable.index == 0:
+        lower = max(lower, rod.shortest + SHORTEST_ROD)
     return replace(variable, lower=min(lower, given), upper=max(upper, given))
+
+
+def _is_tilt(variable: VaryRange) -> bool:
+    """Whether a number leans a base."""
+    return variable.kind is VariableKind.BASE and variable.index in LEANING
 
 
 def _listed(cell: Cell, variable: VaryRange, *, is_varied: bool) -> Variable:

@@ -16,6 +16,7 @@ from cellplan.session.figures import Loads, joint_figures
 from cellplan.session.motion import follow
 from cellplan.session.seams import seam_figures
 from cellplan.session.session import Session
+from cellplan.session.variables import LiveVariables
 
 CELLS = Path(__file__).resolve().parents[2] / "cells"
 PAIR = CELLS / "planar_pair.yaml"
@@ -201,13 +202,30 @@ def test_program_shows_all_blocks() -> None:
 @pytest.mark.slow
 def test_values_that_do_not_go_together_are_said_at_rest() -> None:
     session = edit(CELLS / "four_robots.yaml")
-    session.change({"robots.abb.base.roll_deg": 3.0})  # its column is upright
+    session.change({"robots.abb.base.roll_deg": 0.9, "robots.abb.base.pitch_deg": 0.9})  # its column is upright
 
     answer = settled(session)
     assert answer["state"] == "breaks off"
     assert answer["verdict"].startswith("breaks off: four_robots.yaml:")
     assert answer["is_settled"]
     assert session.do("undo")["state"] == "planned"
+    redone = session.do("redo")
+    assert redone["values"]["robots.abb.base.roll_deg"] == 0.9
+    assert (redone["state"], redone["verdict"]) == (answer["state"], answer["verdict"])
+    assert session.do("undo")["state"] == "planned"
+
+
+@pytest.mark.parametrize(
+    ("cell", "address", "bounds"),
+    [
+        ("four_robots", "robots.abb.base.pitch_deg", (-1.0, 1.0)),  # of a base on a column
+        ("in_turn", "robots.abb.tool.rod.length_mm", (60 / 2 + 3 * 12 + 12 + 1, 2000)),  # round ends that meet
+    ],
+)
+def test_ranges_hold_what_a_cell_may_have(cell: str, address: str, bounds: tuple[float, float]) -> None:
+    variable = LiveVariables.of(load_cell(CELLS / f"{cell}.yaml")).variable(address)
+
+    assert (variable.lower, variable.upper) == pytest.approx(bounds)
 
 
 @pytest.mark.slow
