@@ -37,18 +37,31 @@ def with_overrides(cell: Cell, settings: Iterable[str] = (), **options: str | fl
     return cell.with_values(values) if values else cell
 
 
-def feed_settings(cell: Cell, feed: str | None) -> tuple[str, ...]:
-    """Settings ``KEY=VALUE`` that give all processes with one feed another, such as ``greatest``; none for None.
+def feed_settings(cell: Cell, settings: tuple[str, ...], feed: str | None) -> tuple[str, ...]:
+    """Settings ``KEY=VALUE``, then those that give all processes with one feed another, such as ``greatest``.
+
+    Args:
+        cell: The cell as written.
+        settings: Settings, which processes may come from.
+        feed: The other feed; None adds nothing.
 
     Raises:
-        InputError: There is no such process.
+        InputError: There is no such process, the feed is none, or a setting is not valid.
     """
     if feed is None:
-        return ()
-    tasks = [task.name for task in cell.tasks if task.process is not None and not isinstance(task.path, ProgrammedPath)]
-    if not tasks:
-        raise InputError("--feed: expected a cell with a task that has a process, got none; write process: {feed_mm_s}")
-    return tuple(f"tasks.{name}.process.feed_mm_s={feed}" for name in tasks)
+        return settings
+    try:
+        read_setting(f"feed={feed}")
+    except InputError:
+        raise InputError(f"--feed: expected a number in mm/s, greatest or a range [40, 90], got '{feed}'") from None
+    tasks = with_overrides(cell, settings).tasks
+    names = [task.name for task in tasks if task.process is not None and not isinstance(task.path, ProgrammedPath)]
+    if not names:
+        raise InputError(
+            f"{cell.origin.file}: --feed: expected a cell with a task that has a process, got none; write process: "
+            "{feed_mm_s}"
+        )
+    return (*settings, *(f"tasks.{name}.process.feed_mm_s={feed}" for name in names))
 
 
 def read_settings(settings: Iterable[str], others: Mapping[str, object] | None = None) -> dict[str, object]:

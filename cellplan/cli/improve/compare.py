@@ -45,7 +45,7 @@ def compare(options: CompareOptions) -> Result:
     from cellplan.jobs.compare.compare import compare as run_comparison
     from cellplan.jobs.compare.result import comparison_lines
 
-    job = options.to(CompareJob, settings=_settings(options))
+    job = options.to(CompareJob)
     folder = options.output or Path("outputs") / f"{first_name(job)}-compare"
     job = replace(job, runs=folder if options.keep_runs else None)
     with (
@@ -56,17 +56,6 @@ def compare(options: CompareOptions) -> Result:
         record = run_comparison(job, folder, workers=workers, resume=options.resume, progress=progress)
     status, lines = exit_status(record["counts"]), comparison_lines(record, folder)
     return result_of_folder(options.schema, status, lines, folder / "study.html", study=record)
-
-
-def _settings(options: CompareOptions) -> tuple[str, ...]:
-    """What is set in every cell, the feeds of the tasks of the first one included."""
-    if options.feed is None:
-        return options.settings
-    from cellplan.files.cell.load import load_cell
-    from cellplan.runs.overrides import feed_settings
-
-    file = next((path for path in options.subjects if path.is_file()), options.subjects[0])
-    return (*options.settings, *feed_settings(load_cell(file, allow_dirs=options.allow_dirs), options.feed))
 
 
 def exit_status(counts: dict[str, int]) -> ExitStatus:

@@ -82,7 +82,7 @@ def fastest(options: FastestOptions) -> Result:
 
     demand = None if options.demand is None else read_demand(options.demand)
     given = load_cell(options.cell, allow_dirs=options.allow_dirs)
-    settings = (*options.settings, *feed_settings(given, options.feed))
+    settings = feed_settings(given, options.settings, options.feed)
     cell = with_overrides(given, settings, mode=options.mode, method=options.method)
     require_task(cell, options.task)
     folder, workers = options.output, options.workers or processors()

@@ -53,7 +53,7 @@ def layout_request(options: SearchOptions, *, objective: str, **others: Any) -> 
     """What is searched for, as the options say."""
     if options.feed is not None:
         cell = load_cell(options.cell, allow_dirs=options.allow_dirs)
-        others["settings"] = (*others.get("settings", options.settings), *feed_settings(cell, options.feed))
+        others["settings"] = feed_settings(cell, others.get("settings", options.settings), options.feed)
     return options.to(
         LayoutRequest,
         objective=_word("--objective", objective, Objective),

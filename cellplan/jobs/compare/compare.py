@@ -31,7 +31,7 @@ from cellplan.report.record.summary import program_records
 from cellplan.report.record.variant_figures import variant_curves, variant_figures
 from cellplan.runs.gate.open_gate import open_gate
 from cellplan.runs.outcome import solved_outcome
-from cellplan.runs.overrides import require_task, with_overrides
+from cellplan.runs.overrides import feed_settings, require_task, with_overrides
 from cellplan.runs.solution import Solution
 from cellplan.runs.write_run import versions
 from cellplan.study.bundle import Bundle
@@ -52,6 +52,7 @@ class CompareJob:
         subjects: One cell file, to compare its modes; or several cell files and run folders.
         allow_dirs: Further folders that the files of cells may lie in.
         settings: Values set in every cell, each as ``KEY=VALUE``.
+        feed: Feed of all processes of each cell, such as ``greatest``; None leaves them.
         task: Name of the only task to work on; None for all.
         runs: Folder of the study in which the run of every cell that is solved is kept; None to keep none.
         formats: Formats of the plots beside SVG.
@@ -60,6 +61,7 @@ class CompareJob:
     subjects: tuple[Path, ...]
     allow_dirs: tuple[Path, ...] = ()
     settings: tuple[str, ...] = ()
+    feed: str | None = None
     task: str | None = None
     runs: Path | None = None
     formats: tuple[str, ...] = ()
@@ -98,7 +100,7 @@ def compare(
         "of": "modes" if is_modes else "cells",
         "cell": _cell_name(sources[0]),
         "names": names,
-        "settings": plain_values(dict(map(read_setting, job.settings))),
+        "settings": plain_values(_listed_settings(job)),
         "task": job.task,
         "inputs": dict(zip(_names(job.subjects), map(_inputs, sources), strict=True)),
         "versions": versions(),
@@ -125,7 +127,7 @@ def first_name(job: CompareJob) -> str:
 def files_of(job: CompareJob) -> Bundle:
     """The files of the cells that are compared, and the whole of the runs."""
     cells = [path for path in job.subjects if not path.is_dir()]
-    read = ((path, with_overrides(load_cell(path, allow_dirs=job.allow_dirs), job.settings)) for path in cells)
+    read = ((path, _cell(job, path)) for path in cells)
     return Bundle.of(read, allow_dirs=job.allow_dirs, runs=[path for path in job.subjects if path.is_dir()])
 
 
@@ -143,7 +145,7 @@ def evaluate_subject(job: CompareJob, variant: Variant) -> TrialOutcome:
 
     def solved(values: Mapping[str, object]) -> TrialOutcome:
         def cell() -> Cell:
-            given = with_overrides(load_cell(path, allow_dirs=job.allow_dirs), job.settings)
+            given = _cell(job, path)
             return given.with_values(values) if values else given
 
         return solved_outcome(cell, figures=_solved_figures, file=path, task=job.task, folder=folder)
@@ -174,18 +176,29 @@ def _refuse_unfitting(job: CompareJob) -> None:
             f"{runs[0]}: expected a cell file, to compare its modes, or several cells and runs, got one run; its cell "
             f"is {runs[0] / CELL}"
         )
-    if runs and (job.settings or job.task):
-        option = "--set" if job.settings else "--task"
+    if runs and (job.settings or job.feed or job.task):
+        option = "--set" if job.settings else "--feed" if job.feed else "--task"
         raise InputError(f"{option}: expected cell files only, as a run stays as it is, got the run {runs[0]}")
     if len(job.subjects) == 1 and MODE in dict(map(read_setting, job.settings)):
         raise InputError(f"--set: expected another key than {MODE}, as all modes are compared; use 'cellplan solve'")
+
+
+def _cell(job: CompareJob, path: Path) -> Cell:
+    """A cell with what is set."""
+    cell = load_cell(path, allow_dirs=job.allow_dirs)
+    return with_overrides(cell, feed_settings(cell, job.settings, job.feed))
+
+
+def _listed_settings(job: CompareJob) -> dict[str, object]:
+    """Values by address, and the feed of all processes."""
+    return dict(map(read_setting, job.settings)) | ({} if job.feed is None else {"feed": job.feed})
 
 
 def _source(job: CompareJob, path: Path) -> Cell | StoredRun:
     """A cell, or a run whose files are all as they were written."""
     if path.is_dir():
         return read_stored_run(path)
-    cell = with_overrides(load_cell(path, allow_dirs=job.allow_dirs), job.settings)
+    cell = _cell(job, path)
     require_task(cell, job.task)
     return cell
 
