@@ -242,7 +242,24 @@ def _groups(cell: Cell, opened: Sequence[OpenFeed], trials: _Trials, *, is_lexim
     else:
         raise refused or InputError("greatest feeds: no path can be run along")
     of_runs = [[feed for feed in opened if feed.task.name in run.phase.tasks] for run in solution.runs]
-    return [replace(together, rising=rising, feeds={}) for rising in of_runs if rising]
+    groups = [replace(together, rising=rising, feeds={}) for rising in of_runs if rising]
+    for group in groups:
+        if not is_leximin:
+            _refuse_apart(group)
+    return groups
+
+
+def _refuse_apart(group: _Group) -> None:
+    """Refuse ranges that no one feed, in the ratios of the tasks, is in."""
+    fast = max(group.rising, key=lambda feed: feed.lowest / feed.ratio)
+    if fast.lowest / fast.ratio > group.highest * (1.0 + ROUNDING):
+        slow = min(group.rising, key=lambda feed: feed.highest / feed.ratio)
+        raise InputError(
+            f"{fast.task.where(fast.task.feed_key)}: expected at most {MM * group.highest * fast.ratio:.4g} mm/s as "
+            f"the least feed, as task '{slow.task.name}' has one feed with it in their ratios and at most "
+            f"{MM * slow.highest:.4g} mm/s, got {MM * fast.lowest:.4g}; widen a range or state motion.greatest_feeds: "
+            "leximin"
+        )
 
 
 def _first(cell: Cell, opened: Sequence[OpenFeed], *, is_leximin: bool = False) -> _Group:

@@ -145,6 +145,14 @@ def test_a_range_without_a_feed_that_holds_is_refused_with_what_binds(tmp_path: 
     assert 30.0 < float(match[1]) < 50.0
 
 
+def test_ranges_without_one_feed_for_both_are_refused_by_the_other_task(tmp_path: Path) -> None:
+    cell = cell_of(tmp_path, THREE_FEEDS, bead=[10, 20], ring=[30, 60])
+
+    message = r"tasks\.ring\.process\.feed_mm_s: expected at most 20 mm/s .* task 'bead' .*, got 30;"
+    with pytest.raises(InputError, match=message):
+        planned(cell)
+
+
 def test_a_feed_that_the_rows_are_too_few_for_is_said_with_the_cure(tmp_path: Path) -> None:
     (opened,) = open_feeds(cell_of(tmp_path, THREE_FEEDS, ring="greatest"))
     places = np.array([0.0, 0.1])
