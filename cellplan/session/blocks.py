@@ -98,7 +98,8 @@ class LiveCell:
         bodies = CellDistances.of(scene, variables.layout)
         if self.phases is not None:
             phases = ProgramPhases.of_work(self.phases.work, variables.layout, bodies)
-            blocks = tuple(_of_program(phases))
+            pairs = zip(self.blocks, phases.bodies, strict=True)
+            blocks = tuple(_in_place(it, of_phase, variables) for it, of_phase in pairs)
             return replace(self, cell=cell, variables=variables, scene=scene, phases=phases, blocks=blocks)
         blocks = tuple(_in_place(it, bodies, variables) for it in self.blocks)
         return replace(self, cell=cell, variables=variables, scene=scene, blocks=blocks)
@@ -188,8 +189,9 @@ def is_for_kernel(cell: Cell) -> bool:
 
 def _stages(cell: Cell) -> list[Stage]:
     """What is worked on together in a started cell, one after the other."""
-    if cell.program.is_home_to_home:
-        return [stage for stage in program_stages(cell) if stage.phase.tasks and stage.move is None]
+    if cell.program.is_home_to_home:  # that could not be planned: its tasks have no starts
+        stages = [stage for stage in program_stages(cell) if stage.phase.tasks and stage.move is None]
+        return [replace(stage, cell=_mid_range(stage.cell)) for stage in stages]
     return [Stage(phase=phase, cell=cell) for phase in plan_phases(cell).program]
 
 

@@ -200,6 +200,27 @@ def test_program_shows_all_blocks() -> None:
 
 
 @pytest.mark.slow
+def test_obstacle_is_met_in_all_blocks_of_a_program() -> None:
+    post = "environment.post={box: {size_mm: [100, 100, 2000]}, at: {xyz_mm: [582, 5000, 1000]}}"
+    session = edit(CELLS / "in_turn.yaml", settings=[post])
+    near = [session.change({"environment.post.at.y_mm": 1900}, block=block) for block in range(3)]  # beside the kuka
+    far = [session.change({"environment.post.at.y_mm": 5000}, block=block) for block in range(3)]
+
+    assert [figure(it, "clearance")["is_met"] for it in (*near, *far)] == [False] * 3 + [True] * 3
+
+
+@pytest.mark.slow
+def test_program_without_a_plan_is_opened() -> None:
+    session = edit(CELLS / "in_turn.yaml", settings=["robots.kuka.base.xyz_mm[1]=6000"])
+
+    answer = settled(session)
+    assert len(answer["strip"]) == 3
+    assert answer["strip"][0]["state"] == "breaks off"
+    json.dumps(session.open_record(), allow_nan=False)
+    session.close()
+
+
+@pytest.mark.slow
 def test_values_that_do_not_go_together_are_said_at_rest() -> None:
     session = edit(CELLS / "four_robots.yaml")
     session.change({"robots.abb.base.roll_deg": 0.9, "robots.abb.base.pitch_deg": 0.9})  # its column is upright
