@@ -7,6 +7,7 @@ from typing import Final, Self
 
 from cellplan.errors import InputError
 from cellplan.report.record.common import Record
+from cellplan.scene.scene import Scene
 from cellplan.session.actions import Actions
 from cellplan.session.answer import CERTIFIED, FAILS, PLANNED
 from cellplan.session.document import Document
@@ -108,7 +109,7 @@ class Session:
             "redo": changes.redo,
             "reset": changes.reset,
             "take": lambda: changes.set(actions.offered(argument)),
-            "save": lambda: document.save(as_another=bool(argument)),
+            "save": lambda: _saved(document, as_another=bool(argument)),
             "reload": document.reload,
             "keep": document.keep,
         }
@@ -168,6 +169,12 @@ class Session:
     ) -> None:
         """See ``close``."""
         self.close()
+
+
+def _saved(document: Document, *, as_another: bool) -> Record:
+    """Save values that go together; others are refused, as the file would not open again."""
+    Scene.from_cell(document.cell)
+    return document.save(as_another=as_another)
 
 
 def _restored(engine: Engine, document: Document) -> Engine:

@@ -265,6 +265,18 @@ def test_saved_cell_passes_as_it_was_said(tmp_path: Path) -> None:
         assert "x_mm" not in path.read_text(encoding="utf-8")  # written in place, as the file has poses
 
 
+def test_values_that_do_not_go_together_are_not_saved(tmp_path: Path) -> None:
+    path = tmp_path / "cell.yaml"
+    path.write_bytes((CELLS / "two_robots.yaml").read_bytes())
+    with edit(path) as session:
+        session.change({"part.held_by[0].at.z_mm": 80.0})  # into the links of its holder
+        with pytest.raises(InputError, match=r"cell\.yaml:\d+ .*expected a part clear of the links"):
+            session.do("save")
+
+        assert path.read_bytes() == (CELLS / "two_robots.yaml").read_bytes()
+        assert session.do("undo")["state"] == "planned"
+
+
 @pytest.mark.slow
 def test_certified_state_is_that_of_its_values_alone() -> None:
     with edit(CELLS / "two_robots.yaml") as session:
