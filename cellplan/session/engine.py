@@ -22,7 +22,7 @@ from cellplan.session.judge import Judgement, judged, reason
 from cellplan.session.motion import follow, of_rows
 from cellplan.session.starts import as_given, started, stated_start, written_starts
 
-ADVISED_EVERY: Final = 8  # [-] changes: between them the advice is that of a layout close by
+ADVISED_EVERY: Final = 20  # [-] changes: between them the advice is that of a layout close by
 SAME_START: Final = 1e-3  # [rad] or [m] within which a start that is written is the one that a motion has
 
 
