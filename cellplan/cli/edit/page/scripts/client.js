@@ -101,12 +101,14 @@ class Client {
     this.receivers.gone();
   }
 
-  /** Follow the stream of events until it ends. */
-  async follow() {
+  /** Follow the stream of events until it ends; `opened` is called once none is missed any more. */
+  async follow(opened) {
     const silence = new AbortController();
     let timer = setTimeout(() => silence.abort(), SILENT_MS);
     await this.guarded(async () => {
-      const reader = (await this.post("/events", {}, silence.signal)).body.pipeThrough(new TextDecoderStream()).getReader();
+      const { body } = await this.post("/events", {}, silence.signal);
+      opened();
+      const reader = body.pipeThrough(new TextDecoderStream()).getReader();
       let left = "";
       for (;;) {
         const { done, value } = await answered(reader.read());
