@@ -252,6 +252,9 @@ def test_the_feed_holds_all_along_the_work_where_the_tool_runs_in_and_out(tmp_pa
     assert ring.length == pytest.approx(2.0 * np.pi * 0.03 + 0.035)
     (answer,) = [it for it in run.report.greatest_feeds if it.task == "ring"]
     assert answer.travelled[0] == pytest.approx(-0.02)  # places count from the start of the work
+    speed = run.report.accelerations.process["ring"]
+    assert (speed.steady_share, speed.slower) == (1.0, ())
+    assert speed.mean == pytest.approx(0.06, rel=1e-3)
 
 
 @pytest.mark.parametrize(

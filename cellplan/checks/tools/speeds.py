@@ -66,11 +66,12 @@ def process_speeds(schedule: Schedule, X_WT: Mapping[str, Array], X_WP: Array) -
 
 
 def _process_speed(schedule: Schedule, scheduled: TaskSchedule, X_WT: Array, X_WP: Array) -> ProcessSpeed | None:
-    """Speeds between the samples from the start of the path, once settled, to its end; None for a tool at rest."""
+    """Speeds between the samples of the path, once settled, without its runs; None for a tool at rest."""
     task, times = scheduled.task, schedule.times
     tolerance = 1e-6 * float(times[-1])  # rounding of times
-    begin = scheduled.begin + task.settle
-    steps = np.flatnonzero((times[:-1] >= begin - tolerance) & (times[1:] <= scheduled.end + tolerance))
+    begin = max(scheduled.begin + task.settle, scheduled.work[0])
+    end = min(scheduled.end, scheduled.work[1])
+    steps = np.flatnonzero((times[:-1] >= begin - tolerance) & (times[1:] <= end + tolerance))
     if not len(steps) or not scheduled.length > 0.0:
         return None
     points = points_of_travel(schedule, scheduled, X_WT, X_WP)

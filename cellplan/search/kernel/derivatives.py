@@ -101,9 +101,7 @@ class _Rates:
         mobility = job.constraints.may_move / weights
         inverse = self._inverse(J, mobility)
         relative = qd if job.drift is None else qd - job.constraints.may_move * job.drift
-        forces = (
-            np.swapaxes(inverse, 1, 2) @ (weights * relative)[:, :, None]
-        )  # multipliers, as W (qd - u) = J^T lambda
+        forces = np.swapaxes(inverse, 1, 2) @ (weights * relative)[:, :, None]  # multipliers: W (qd - u) = J^T lambda
         bent = mobility[:, None] * changes.forces(forces[..., 0])
         bent[:, :, nq:] -= (directions.weights / weights[:, None]) * relative[:, :, None]
         if directions.drift is not None:

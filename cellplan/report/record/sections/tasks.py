@@ -48,7 +48,7 @@ class DirectionRecord(TypedDict):
 
 
 class ProcessSpeedRecord(TypedDict):
-    """Speed of the tool tip relative to the part, from the start of the path, once settled, to its end."""
+    """Speed of the tool tip relative to the part, on its path, once settled, without its runs."""
 
     mean_mm_s: Annotated[Number, "mean speed"]
     peak_mm_s: Annotated[Number, "largest speed"]
