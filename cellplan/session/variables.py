@@ -1,7 +1,8 @@
 """Variables of a live cell: which of its numbers may be changed, and what they do to a candidate for the kernel."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -18,7 +19,6 @@ from cellplan.search.variables.state import State
 from cellplan.search.variables.ties import Tied
 from cellplan.search.variables.variables import Variables
 from cellplan.search.variables.written import written_number
-from cellplan.session.variable import Variable
 
 POSE: Final = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")
 LEANING: Final = (3, 4)  # places of its roll and pitch
@@ -28,9 +28,40 @@ TURN: Final = 2.0 * np.pi  # [rad] to either side of an angle likewise
 LONGEST_ROD: Final = 2.0  # [m]
 SHORTEST_ROD: Final = 0.001  # [m] of a rod between its round ends
 MOST_TILT: Final = np.radians(170.0)  # [rad] of a rod
-STEP_MM: Final = 10.0  # of one press of a key
-STEP_DEG: Final = 1.0
 NAMES: Final = {VariableKind.GRASP: "part", VariableKind.PART: "part"}  # in kinds and labels; others by their own name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variable:
+    """A number at an address of the cell file, in file units."""
+
+    address: str  # as ``--set`` takes it
+    label: str  # what a person calls it
+    kind: str  # base_x, tool_length, obstacle_yaw, …
+    subject: str  # robot, obstacle or part that it belongs to
+    unit: str  # mm or deg
+    given: float  # value in the file
+    lower: float  # least value that is accepted
+    upper: float  # greatest one
+    is_locked: bool = False  # whether ``layout.fixed`` of the cell names it
+    is_varied: bool = False  # whether ``layout.vary`` of the cell states its range
+
+    def accepted(self, value: float) -> float:
+        """A value that may stand there; others are refused.
+
+        Raises:
+            InputError: The variable is locked, or the value is not finite or out of its range.
+        """
+        if self.is_locked:
+            raise InputError(f"{self.address}: is locked by layout.fixed of the cell; take it out there")
+        if not math.isfinite(value) or not self.lower <= value <= self.upper:
+            expected = f"a number from {self.lower:g} to {self.upper:g} {self.unit}"
+            raise InputError(f"{self.address}: expected {expected}, got {value:g}")
+        return value
+
+    def record(self, *, value: float) -> dict[str, Any]:
+        """The variable with its present value, for pages."""
+        return {**asdict(self), "value": value}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -193,7 +224,6 @@ def _listed(cell: Cell, variable: VaryRange, *, is_varied: bool) -> Variable:
         given=written_number(variable, float(variable.given or 0.0)),
         lower=written_number(variable, variable.lower),
         upper=written_number(variable, variable.upper),
-        step=STEP_DEG if variable.is_angle else STEP_MM,
         is_locked=_is_locked(cell, variable.address),
         is_varied=is_varied,
     )
@@ -219,7 +249,6 @@ def _of_obstacles(cell: Cell) -> Iterator[Variable]:
                     given=float(value),
                     lower=float(value) - wide,
                     upper=float(value) + wide,
-                    step=STEP_DEG if unit == "deg" else STEP_MM,
                     is_locked=False,
                 )
 

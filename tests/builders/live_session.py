@@ -147,7 +147,6 @@ def _variables(scene: Record) -> Iterator[Record]:
                 "given": value,
                 "lower": value - reach,
                 "upper": value + reach,
-                "step": 1.0,
                 "is_locked": name == "idle",
                 "is_varied": is_varied,
             }
