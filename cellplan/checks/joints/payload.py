@@ -6,29 +6,20 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.inertia import centre_and_inertia
-from cellplan.geometry.transforms import Array, inverse, transform_points
+from cellplan.geometry.transforms import Array
 from cellplan.measures.accelerations import point_accelerations
-from cellplan.model.cell.cell import Cell, Grasp, Robot, RobotRows
+from cellplan.model.cell.cell import Cell, Robot, RobotRows
 from cellplan.model.report.report import Check
+from cellplan.model.robot.inertia import CarriedMass
 from cellplan.model.robot.payload import AxisUse, LoadUse
 from cellplan.model.robot.robot import BASE, FollowerJoint, Joint
 from cellplan.model.settings.robot import AxisLimitEntry, PayloadEntry
 from cellplan.model.units import MM
+from cellplan.scene.dynamics.loads import GRAVITY, carried_masses, part_share, tool_mass
 from cellplan.scene.kinematics.screw_chain import Chains, ScrewChain
 
-GRAVITY: Final = 9.80665  # [m/s^2] standard gravity, downwards along the world's z
 UP: Final = np.array([0.0, 0.0, 1.0])
 WRIST_AXIS_COUNT: Final = 3  # [-] revolute axes before the flange that are judged
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Mass:
-    """A mass on a flange: in [kg], its centre in F in [m], and its inertia about the centre in F in [kg m^2]."""
-
-    mass: float
-    centre_F: Array
-    inertia_F: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,9 +35,7 @@ class _CarriedLoad:
 def load_uses(cell: Cell, chains: Chains, times: Array, q: RobotRows) -> tuple[LoadUse, ...]:
     """What every robot carries over a run.
 
-    The part is shared equally by all that hold it. A tool weighs at its stated centre, else at its tip; the part at its
-    stated centre, else at that of its shape with uniform density, which also gives its inertia about the centre. The
-    tool's inertia about its own centre is not known and not counted.
+    The part is shared equally by all that hold it; where the masses weigh says ``carried_masses``.
 
     Args:
         times: Times of the rows in [s], shape (N,).
@@ -66,18 +55,16 @@ def check_payload_at_rest(cell: Cell, chains: Chains, start: Array) -> list[Chec
 
 
 def _load_use(cell: Cell, robot: Robot, chain: ScrewChain, *, times: Array, q: Array) -> LoadUse:
-    grasp = next((grasp for grasp in cell.part.held_by if grasp.robot == robot.name), None)
-    share = None if cell.part.mass is None else cell.part.mass / max(1, len(cell.positioners))
     use = LoadUse(
         robot=robot.name,
-        tool_mass=0.0 if robot.tool.mass is None and robot.tool.is_bare else robot.tool.mass,
-        part_mass=0.0 if grasp is None else share,
+        tool_mass=tool_mass(robot),
+        part_mass=part_share(cell, robot),
         holders=len(cell.positioners),
         limits=robot.model.payload,
     )
     if not use.is_known or use.known_mass == 0.0:
         return use
-    masses = _masses(cell, robot, grasp, use)
+    masses = carried_masses(cell, robot)
     D = chain.link_displacements(q)
     X_WF = D[:, robot.model.flange_link + 1] @ robot.model.X_BF
     carried = [_carried(mass, X_WF, times) for mass in masses]
@@ -91,24 +78,7 @@ def _load_use(cell: Cell, robot: Robot, chain: ScrewChain, *, times: Array, q: A
     )
 
 
-def _masses(cell: Cell, robot: Robot, grasp: Grasp | None, use: LoadUse) -> list[_Mass]:
-    """The tool and the share of the part, where they have a mass."""
-    masses, tool, part = [], robot.tool, cell.part
-    if use.tool_mass:
-        centre_F = tool.X_FT[:3, 3] if tool.centre is None else tool.centre
-        masses.append(_Mass(mass=use.tool_mass, centre_F=centre_F, inertia_F=np.zeros((3, 3))))
-    if use.part_mass and grasp is not None:
-        X_FS = tool.X_FT @ inverse(grasp.X_PT) @ part.X_PS
-        centre_S, inertia_S = centre_and_inertia(part.shape)
-        p_FC = transform_points(X_FS, centre_S[None])[0]
-        if part.centre is not None:
-            p_FC = transform_points(X_FS @ inverse(part.X_PS), part.centre[None])[0]
-        R = X_FS[:3, :3]
-        masses.append(_Mass(mass=use.part_mass, centre_F=p_FC, inertia_F=use.part_mass * R @ inertia_S @ R.T))
-    return masses
-
-
-def _carried(mass: _Mass, X_WF: Array, times: Array) -> _CarriedLoad:
+def _carried(mass: CarriedMass, X_WF: Array, times: Array) -> _CarriedLoad:
     """A mass that moves with a flange of poses of shape (N, 4, 4)."""
     R = X_WF[:, :3, :3]
     points = R @ mass.centre_F + X_WF[:, :3, 3]

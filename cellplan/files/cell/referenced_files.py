@@ -274,13 +274,16 @@ def _only_for_urdf(name: str, entry: RobotEntry, document: YamlDocument) -> Iter
     for key in ("package_dirs", "xacro_args", "flange", "locked", "srdf", "moveit_limits", "gripper"):
         if getattr(entry, key):
             yield document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
+    if entry.inertias == "urdf":
+        text = "expected masses of its links, got urdf, which applies to a URDF only"
+        yield document.finding(("robots", name, "inertias"), text)
 
 
 def _read_urdf(known: Urdfs, entry: RobotEntry, place: Path, *, options: "UrdfOptions") -> "UrdfRobot":
     """Robot of a URDF; robots that say the same of the same file share one."""
     from cellplan.files.robots.urdf.load import load_urdf
 
-    locked = _items(options.locked), _items(options.lock_units), options.locks_others, options.gripper
+    locked = _items(options.locked), _items(options.lock_units), options.locks_others, options.gripper, options.inertias
     limits, arguments = (_items(options.limits), entry.moveit_limits), (_items(options.xacro_args), entry.srdf)
     key = (entry.model, place, options.flange, options.package_dirs, limits, locked, arguments)
     if key not in known:
@@ -310,6 +313,7 @@ def _urdf_options(
         moveit=None if moveit is None else read_moveit_limits(moveit, str(moveit)),
         xacro_args=_arguments(entry),
         xacro_elsewhere=argument_names(srdf) if _is_xacro(entry.srdf) and within.holds(srdf) else frozenset(),
+        inertias=entry.inertias == "urdf",
         gripper=_gripper_state(entry.gripper),
     )
 

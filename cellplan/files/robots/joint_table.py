@@ -19,6 +19,7 @@ from cellplan.files.robots.build_controller import (
     payload_findings,
     sense_findings,
 )
+from cellplan.files.robots.inertias import inertia_findings, with_inertias
 from cellplan.files.robots.limits import RATES
 from cellplan.files.schema import RobotTableDocument
 from cellplan.files.schema.messages import validate
@@ -80,6 +81,7 @@ def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Findin
         if body.name is not None and TOOL_NAME.fullmatch(body.name):
             text = f"expected another name, '{body.name}' means the tool of the robot"
             yield document.finding((*place, index, "name"), text)
+    yield from inertia_findings(("inertias",), table.inertias, links, document)
     turning = tuple(name for name, joint in table.joints.items() if joint.type == "revolute")
     yield from payload_findings(("payload",), table.payload, turning, document)
     turns = {name: joint.type == "revolute" for name, joint in table.joints.items()}
@@ -147,7 +149,7 @@ def _bodies(table: RobotTableDocument, meshes: _Meshes) -> Iterator[Body]:
 def _model(table: RobotTableDocument, bodies: tuple[Body, ...]) -> RobotModel:
     """The robot in [m] and [rad]."""
     joints = tuple(_joint(name, entry, index - 1) for index, (name, entry) in enumerate(table.joints.items()))
-    return RobotModel(
+    model = RobotModel(
         name=table.robot,
         source=table.source,
         joints=joints,
@@ -162,6 +164,7 @@ def _model(table: RobotTableDocument, bodies: tuple[Body, ...]) -> RobotModel:
             Link(name=name, index=index - 1, X_BL=np.eye(4)) for index, name in enumerate((FOOT, *table.joints))
         ),
     )
+    return with_inertias(model, table.inertias)
 
 
 def _body_accuracy(table: RobotTableDocument) -> BodyAccuracyEntry | None:

@@ -10,7 +10,8 @@ from cellplan.model.units import joint_unit
 
 LIMIT_TOL: Final = 1e-9  # [rad], [m] and their rates: a number of degrees need not read back to the last bit
 SHOWN_DECIMALS: Final = 6  # of degrees or millimetres in a message
-RATES: Final = {"lower": "", "upper": "", "velocity": "_s", "acceleration": "_s2", "jerk": "_s3"}  # ending of the unit
+# limits by name, with the ending of the unit; that of a torque is one of its own
+RATES: Final = {"lower": "", "upper": "", "velocity": "_s", "acceleration": "_s2", "jerk": "_s3", "torque": ""}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,6 +23,7 @@ class StatedLimits:
     velocity: float | None = None  # largest velocity
     acceleration: float | None = None  # largest acceleration
     jerk: float | None = None  # largest jerk
+    torque: float | None = None  # largest torque in [N m] or force in [N]
     wraps: bool = False  # whether a continuous joint may turn without end
 
 
@@ -48,20 +50,25 @@ def limit_findings(limits: StatedLimits, cell: StatedLimits, *, is_revolute: boo
     """Limits of a cell that are wider than those of the model or leave no range, by key of the cell file."""
     unit = joint_unit(is_revolute=is_revolute)
 
-    def text(value: float) -> str:
+    def text(value: float, scale: float = unit.scale) -> str:
         """A value in the unit of the cell file."""
-        return shown(round(value * unit.scale, SHOWN_DECIMALS))
+        return shown(round(value * scale, SHOWN_DECIMALS))
 
     for name, rate in RATES.items():
+        scale = 1.0 if name == "torque" else unit.scale
         limit, value = getattr(limits, name), getattr(cell, name)
         sign, bound = (-1.0, "least") if name == "lower" else (1.0, "most")
         if limit is not None and value is not None and sign * (value - limit) > LIMIT_TOL:
             yield (
-                f"{name}_{unit.name}{rate}",
-                f"expected at {bound} {text(limit)}, the limit of the model, got {text(value)}",
+                _torque_key(is_revolute=is_revolute) if name == "torque" else f"{name}_{unit.name}{rate}",
+                f"expected at {bound} {text(limit, scale)}, the limit of the model, got {text(value, scale)}",
             )
     lower = limits.lower if cell.lower is None else cell.lower
     upper = limits.upper if cell.upper is None else cell.upper
     if lower is not None and upper is not None and not lower < upper:
         key = "lower" if cell.upper is None else "upper"
         yield f"{key}_{unit.name}", f"expected a lower limit below the upper one, got {text(lower)} and {text(upper)}"
+
+
+def _torque_key(*, is_revolute: bool) -> str:
+    return "torque_nm" if is_revolute else "force_n"

@@ -8,11 +8,13 @@ import numpy as np
 
 from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, listed, unknown_name
 from cellplan.files.robots.build_controller import payload_findings
+from cellplan.files.robots.inertias import inertia_findings, with_inertias
 from cellplan.files.robots.limits import RATES, StatedLimits, limit_findings, limits_of, rates_of, tightest
 from cellplan.files.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
 from cellplan.files.yaml.reader import YamlDocument
 from cellplan.geometry.transforms import Array
 from cellplan.model.robot.robot import Joint, RobotModel, configuration_in_si, start_keys
+from cellplan.model.settings.robot import InertiasEntry
 from cellplan.model.settings.units import Mm, si_or_none
 
 FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference configuration: farther is a wrong unit
@@ -44,6 +46,9 @@ def robot_findings(name: str, entry: RobotEntry, model: RobotModel, document: Ya
     yield from _unit_findings(("robots", name), entry, model, document)
     turning = tuple(joint.name for joint in model.joints if joint.is_revolute)
     yield from payload_findings(("robots", name, "payload"), entry.payload, turning, document)
+    if isinstance(entry.inertias, InertiasEntry):
+        links = tuple(link.name for link in model.links)
+        yield from inertia_findings((*path, "inertias"), entry.inertias, links, document)
     for number, names in enumerate(it.joints for it in entry.joint_sums):
         for index, joint in enumerate(names):
             if joint not in turning:
@@ -133,4 +138,6 @@ def with_statements(entry: RobotEntry, model: RobotModel) -> RobotModel:
     if entry.bodies is not None:
         bodies = tuple(replace(body, accuracy=None) for body in model.bodies)
         model = replace(model, body_accuracy=entry.bodies, bodies=bodies)
+    if isinstance(entry.inertias, InertiasEntry):
+        model = with_inertias(model, entry.inertias)
     return model if entry.payload is None else replace(model, payload=entry.payload)

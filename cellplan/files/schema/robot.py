@@ -24,13 +24,14 @@ from cellplan.model.settings.entry import (
     rule,
     setting,
 )
-from cellplan.model.settings.robot import FARTHEST, BodyAccuracyEntry, JointPosition, PayloadEntry
+from cellplan.model.settings.robot import FARTHEST, BodyAccuracyEntry, InertiasChoice, JointPosition, PayloadEntry
 from cellplan.model.settings.task import LONGEST_S
-from cellplan.model.settings.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS2, MmPerS3, Quantity, Within
+from cellplan.model.settings.units import Deg, DegPerS, DegPerS2, DegPerS3, InSi, Mm, MmPerS2, MmPerS3, Quantity, Within
 
 LARGEST_JOINT_DEG: Final = 3600.0  # ten turns: a wider range is a wrong unit
 FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a wrong unit
 STEEPEST: Final = 1e9  # deg/s2 or mm/s2, as in robot files
+STRONGEST: Final = 1e7  # [N m] or [N] no drive has more
 WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses all its digits
 AXIS_LIMIT: Final = 64  # joints of one robot
 ORDER_LIMIT: Final = 400  # tasks and marks of one robot
@@ -42,10 +43,11 @@ TurningAcceleration = Annotated[DegPerS2, Within(gt=0.0, le=STEEPEST)]
 SlidingAcceleration = Annotated[MmPerS2, Within(gt=0.0, le=STEEPEST)]
 TurningJerk = Annotated[DegPerS3, Within(gt=0.0, le=STEEPEST)]
 SlidingJerk = Annotated[MmPerS3, Within(gt=0.0, le=STEEPEST)]
+Torque = Annotated[InSi, Within(gt=0.0, le=STRONGEST)]
 Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
 
-TURNING_LIMITS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
-SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
+TURNING_LIMITS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2", "jerk_deg_s3", "torque_nm")
+SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3", "force_n")
 
 OTHERS: Final = "others"  # key of all joints that do not lead to the flange, where they are locked together
 LOCK_WORDS: Final = "a number, or zero for the key others"
@@ -125,11 +127,13 @@ class LimitsEntry(Entry):
     velocity_deg_s: TurningSpeed | None = setting(None, "Largest speed of a revolute joint.")
     acceleration_deg_s2: TurningAcceleration | None = setting(None, "Largest acceleration of a revolute joint.")
     jerk_deg_s3: TurningJerk | None = setting(None, "Largest jerk of a revolute joint.")
+    torque_nm: Torque | None = setting(None, "Largest torque of the drive of a revolute joint, behind its gears.")
     lower_mm: Coordinate | None = setting(None, "Lowest position of a prismatic joint.")
     upper_mm: Coordinate | None = setting(None, "Highest position of a prismatic joint.")
     velocity_mm_s: SlidingSpeed | None = setting(None, "Largest speed of a prismatic joint.")
     acceleration_mm_s2: SlidingAcceleration | None = setting(None, "Largest acceleration of a prismatic joint.")
     jerk_mm_s3: SlidingJerk | None = setting(None, "Largest jerk of a prismatic joint.")
+    force_n: Torque | None = setting(None, "Largest force of the drive of a prismatic joint.")
     wrap: bool = setting(False, "Whether a continuous joint may turn without end.")
 
     @model_validator(mode="after")
@@ -151,7 +155,7 @@ class LimitsEntry(Entry):
     def unit(self) -> str | None:
         """``deg`` or ``mm``; None when neither occurs."""
         given = self.model_dump(exclude_none=True, exclude={"wrap"})
-        return None if not given else "mm" if any("_mm" in name for name in given) else "deg"
+        return None if not given else "mm" if any(name in SLIDING_LIMITS for name in given) else "deg"
 
 
 class RailEntry(Entry):
@@ -220,6 +224,11 @@ class RobotEntry(Entry):
         None, "How good its link bodies are; when absent what the robot's own file says."
     )
     payload: PayloadEntry | None = setting(None, "What it may carry; when absent what the robot's own file says.")
+    inertias: InertiasChoice | None = setting(
+        None,
+        "Masses and inertias of its links: `urdf` takes those of the URDF, with the efforts there as largest torques; "
+        "else they are stated here. When absent what a joint-axis table states.",
+    )
     srdf: Text | None = setting(
         None,
         "Path of an SRDF (.srdf, .xacro) for a URDF: pairs of its links that are not checked against each other, and "

@@ -11,6 +11,7 @@ from cellplan.files.schema.robot import (
     JointAngle,
     SlidingAcceleration,
     SlidingJerk,
+    Torque,
     TurningAcceleration,
     TurningJerk,
     TurningSpeed,
@@ -35,7 +36,7 @@ from cellplan.model.settings.entry import (
     rule,
     setting,
 )
-from cellplan.model.settings.robot import Accuracy, PayloadEntry, ReachEntry
+from cellplan.model.settings.robot import Accuracy, InertiasEntry, PayloadEntry, ReachEntry
 
 BODY_LIMIT: Final = 200  # solids of one robot
 UNIT_TOL: Final = 1e-3  # [-] room for axes written with four digits
@@ -54,6 +55,9 @@ class JointEntry(Entry):
         None, "Largest acceleration of a revolute joint, if known."
     )
     jerk_deg_s3: TurningJerk | None = setting(None, "Largest jerk of a revolute joint, if known.")
+    torque_nm: Torque | None = setting(
+        None, "Largest torque of the drive of a revolute joint, behind its gears, if known."
+    )
     lower_mm: Coordinate | None = setting(None, "Lowest position of a prismatic joint.")
     upper_mm: Coordinate | None = setting(None, "Highest position of a prismatic joint.")
     velocity_mm_s: SlidingSpeed | None = setting(None, "Largest speed of a prismatic joint.")
@@ -61,6 +65,7 @@ class JointEntry(Entry):
         None, "Largest acceleration of a prismatic joint, if known."
     )
     jerk_mm_s3: SlidingJerk | None = setting(None, "Largest jerk of a prismatic joint, if known.")
+    force_n: Torque | None = setting(None, "Largest force of the drive of a prismatic joint, if known.")
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -182,6 +187,7 @@ class RobotTableDocument(Entry):
         "also states their accuracy.",
     )
     payload: PayloadEntry | None = setting(None, "What the robot may carry; the report says so when absent.")
+    inertias: InertiasEntry | None = setting(None, "Masses and inertias of the links, if known.")
     reach: ReachEntry | None = setting(None, "Reach as the maker publishes it, if known.")
     controller: ControllerZeroEntry | None = setting(
         None,

@@ -13,6 +13,7 @@ from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import is_rigid
 from cellplan.model.robot.controller import ControllerZero
+from cellplan.model.robot.inertia import LinkInertia
 from cellplan.model.settings.units import Deg, Mm, in_si
 from cellplan.model.units import DisplayUnit, joint_unit
 
@@ -65,6 +66,7 @@ class Joint:
     velocity: float  # largest allowed speed in [rad/s] or [m/s]
     acceleration: float | None = None  # largest allowed acceleration, if known
     jerk: float | None = None  # largest allowed jerk, if known
+    torque: float | None = None  # largest torque in [N m] or force in [N] of its drive, behind the gears, if known
     # top speed of the arm itself, where the cell allows less; None where it does not
     rated_velocity: float | None = None
 
@@ -154,6 +156,9 @@ class RobotModel:
     disabled: tuple[tuple[str, str, str], ...] = ()
     controller: ControllerZero | None = None  # how its controller counts the joints; None when it is not stated
     reach: "ReachEntry | None" = None  # reach as the maker publishes it; None when it is not stated
+    # masses of the links, one for each that has some; None when they are not stated
+    inertias: tuple[LinkInertia, ...] | None = None
+    inertia_source: str = ""  # where they come from
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""
@@ -290,6 +295,7 @@ def on_rail(model: RobotModel, rail: Joint) -> RobotModel:
         followers=tuple(replace(it, parent=it.parent + 1, leader=it.leader + 1) for it in model.followers),
         bodies=tuple(replace(body, link=body.link + 1) for body in model.bodies),
         links=tuple(replace(link, index=link.index + 1) for link in model.links),
+        inertias=None if model.inertias is None else tuple(replace(it, link=it.link + 1) for it in model.inertias),
         flange_link=model.flange_link + 1,
         controller=None if model.controller is None else _after_rail(model.controller),
     )

@@ -1,18 +1,20 @@
 """Published figures of a robot: accuracy of its link bodies, payload and reach."""
 
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
-from pydantic import Field
+from pydantic import Field, Tag
 
-from cellplan.model.settings.entry import Entry, Size, Text, setting
+from cellplan.model.settings.entry import Coordinates, Entry, PoseEntry, Size, Text, by_kind, setting
 from cellplan.model.settings.units import Mm, Within
 
 HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
+LARGEST_INERTIA: Final = 1e6  # [kg m^2] of a link
 ROUGHEST_MM: Final = 1_000.0  # bodies that are farther off stand for nothing
 FARTHEST: Final = 100_000.0  # [deg] or [mm] of a joint
 
 JointPosition = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 Accuracy = Annotated[Mm, Within(ge=0.0, le=ROUGHEST_MM)]
+Moment = Annotated[float, Field(ge=-LARGEST_INERTIA, le=LARGEST_INERTIA)]
 LoadFigure = Annotated[float, Field(gt=0.0, le=HEAVIEST_KG)]
 
 
@@ -43,6 +45,38 @@ class PayloadEntry(Entry):
     def is_mass_only(self) -> bool:
         """Whether nothing but the mass is published."""
         return self.along_mm is None and self.across_mm is None and not self.axes
+
+
+class LinkInertiaEntry(Entry):
+    """The mass of a link; what has none may be left out."""
+
+    mass_kg: LoadFigure = Field(description="Mass.")
+    centre_mm: Coordinates = Field(description="Centre of mass.")
+    inertia_kg_m2: tuple[Moment, Moment, Moment, Moment, Moment, Moment] = Field(
+        description="Inertia about the centre of mass: xx, xy, xz, yy, yz, zz, the products with the sign that they "
+        "have in the matrix, as in URDF."
+    )
+    at: PoseEntry | None = setting(
+        None,
+        "Frame of centre and inertia, given in the base frame while all joints read zero; when absent the frame of "
+        "the link of a URDF, the base frame of a joint-axis table.",
+    )
+
+
+class InertiasEntry(Entry):
+    """Masses and inertias of the links of a robot."""
+
+    links: dict[str, LinkInertiaEntry] = Field(
+        description="By the word base or the joint that carries a link; for a URDF by the name of the link."
+    )
+    source: Text = setting("not stated", "Where the figures come from.")
+
+
+INERTIAS_WORDS: Final = "urdf or a mapping (links, source)"
+InertiasChoice = Annotated[
+    Annotated[Literal["urdf"], Tag(f"<{INERTIAS_WORDS}>")] | Annotated[InertiasEntry, Tag("<mapping>")],
+    by_kind(INERTIAS_WORDS, mapping=dict),
+]
 
 
 class ReachEntry(Entry):

@@ -74,6 +74,15 @@ class DegPerS3(Deg):
     """Degrees per second³."""
 
 
+class InSi(Quantity):
+    """A number that is in its SI unit already, such as newton metres."""
+
+    @property
+    def si(self) -> float:
+        """The number itself."""
+        return float(self)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Within:
     """Bounds of a quantity in the unit of the file, as in ``Annotated[Mm, Within(ge=0.0, le=1000.0)]``."""

@@ -103,7 +103,7 @@ class ScrewChain:
         screws = np.zeros((len(D), 6, self._n))
         for link in reversed(self._links_to_flange):
             axis, drive = self._axes[link], self._drives[link]
-            screws[:, :, drive.joint] += drive.ratio * _moved_screw(axis, D[:, axis.parent + 1])
+            screws[:, :, drive.joint] += drive.ratio * moved_screw(axis, D[:, axis.parent + 1])
         return screws
 
     def _positions(self, q: Array) -> list[Array]:
@@ -148,7 +148,7 @@ def _screw_factors(axis: Joint | FollowerJoint) -> Array:
     return factors
 
 
-def _moved_screw(axis: Joint | FollowerJoint, D: Array) -> Array:
+def moved_screw(axis: Joint | FollowerJoint, D: Array) -> Array:
     """Unit screw of an axis carried along by displacements of shape (N, 4, 4), linear part first, shape (N, 6)."""
     s = D[:, :3, :3] @ axis.axis_B
     if not axis.is_revolute:

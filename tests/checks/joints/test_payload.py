@@ -16,7 +16,7 @@ from builders.scene_builders import (
     slide_model,
 )
 
-from cellplan.checks.joints.payload import GRAVITY, check_payload, check_payload_at_rest, load_uses, point_accelerations
+from cellplan.checks.joints.payload import check_payload, check_payload_at_rest, load_uses, point_accelerations
 from cellplan.geometry.shapes import Box, Cylinder, Sphere
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Grasp, Robot, Tool
@@ -24,6 +24,7 @@ from cellplan.model.robot.payload import LoadUse
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.robot import AxisLimitEntry, PayloadEntry
 from cellplan.report.record.sections.payload import unjudged_loads
+from cellplan.scene.dynamics.loads import GRAVITY
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 TIMES = np.linspace(0.0, 1.0, 1001)

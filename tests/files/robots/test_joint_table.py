@@ -121,7 +121,7 @@ def test_a_mesh_body_is_read_from_below_the_table(tmp_path: Path) -> None:
             "lower_deg: -500",
             ":4: joints.rail.lower_deg: unexpected key, a prismatic joint "
             "has lower_mm, "
-            "upper_mm, velocity_mm_s, acceleration_mm_s2, jerk_mm_s3",
+            "upper_mm, velocity_mm_s, acceleration_mm_s2, jerk_mm_s3, force_n",
         ),
         (
             "velocity_deg_s: 90",

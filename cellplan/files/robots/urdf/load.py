@@ -16,6 +16,7 @@ from cellplan.files.robots.urdf.document.xacro import XacroSettings
 from cellplan.files.robots.urdf.drawings import small_bodies
 from cellplan.files.robots.urdf.flange import choose_flange, flange_remarks
 from cellplan.files.robots.urdf.gripper import GripperState, gripper_locks, require_opposed
+from cellplan.files.robots.urdf.inertials import DYNAMIC, urdf_inertias, with_efforts
 from cellplan.files.robots.urdf.limits import joint_range, missing_error, missing_limits
 from cellplan.files.robots.urdf.locks import require_sound_locks, rest_position, unlocked_error, unlocked_joints
 from cellplan.files.robots.urdf.moveit_limits import MoveitLimits, with_moveit_limits
@@ -49,6 +50,7 @@ class UrdfOptions:
     moveit: MoveitLimits | None = None  # limits that MoveIt states
     xacro_args: Mapping[str, str] = field(default_factory=dict)  # values of the arguments of a xacro file, by name
     xacro_elsewhere: frozenset[str] = frozenset()  # names of those that another file of the robot takes
+    inertias: bool = False  # whether its inertias are taken, and its efforts as largest torques
     gripper: GripperState | None = None  # how far its gripper is open; None to leave its joints to ``locked``
 
     @property
@@ -101,11 +103,13 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         InputError: With file and line, for anything that cannot be taken over faithfully.
     """
     options = options or UrdfOptions()
-    tree = build_tree(with_moveit_limits(read_document(path, options.xacro), options.moveit))
+    document = read_document(path, options.xacro, used=DYNAMIC if options.inertias else ())
+    document = with_moveit_limits(with_efforts(document) if options.inertias else document, options.moveit)
+    tree = build_tree(document)
     flange = choose_flange(tree, options.flange)
     held = gripper_locks(tree, flange, options.gripper, options.locked)
     structure = urdf_structure(tree, flange, replace(options, locked={**options.locked, **held}))
-    roles, document = structure.roles, tree.document
+    roles = structure.roles
     _require_plain_names(roles)
     _require_known_limits(document, roles, options.limits)
     missing = missing_limits(roles.driven, options.limits)
@@ -117,6 +121,8 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     shelf = MeshShelf(Packages(folder=path.parent, package_dirs=options.package_dirs, within=options.within))
     bodies = link_bodies(tree, structure.configuration, shelf)
     model = urdf_model(structure, bodies, limits=options.limits, source=path.name)
+    if options.inertias:
+        model = replace(model, inertias=urdf_inertias(tree, structure.configuration), inertia_source=path.name)
     require_opposed(tree, options.gripper, locks=held, configuration=structure.configuration, bodies=model.bodies)
     return UrdfRobot(
         model=model,

@@ -101,8 +101,10 @@ class UrdfDocument:
 Named = TypeVar("Named", UrdfLink, UrdfJoint)
 
 
-def read_document(path: Path, settings: XacroSettings | None = None) -> UrdfDocument:
+def read_document(path: Path, settings: XacroSettings | None = None, *, used: tuple[str, ...] = ()) -> UrdfDocument:
     """Read a URDF, or expand a file ``.xacro`` with its settings into one, and check every element for itself.
+
+    Names that the reader uses beside these are ``used``: they are not listed as unused.
 
     An ``InputError`` has file and line of what is missing, double, misspelt, out of range or not supported.
     """
@@ -126,7 +128,7 @@ def read_document(path: Path, settings: XacroSettings | None = None) -> UrdfDocu
         hint = ": is it a file of macros that others include?" if included is not None and not links else ""
         raise InputError(f"{path.name}: expected 1 to {MAX_LINKS} links, got {len(links)}{hint}")
     _require_nothing_hidden(root, links, joints)
-    if unused := list(dict.fromkeys(unused_names(root))):
+    if unused := list(dict.fromkeys(name for name in unused_names(root) if name not in used)):
         remarks.add("unused", f"{path.name}: known, but not used: {listed(unused)}")
     return UrdfDocument(
         file=path.name, name=_name(root), links=links, joints=joints, remarks=remarks.lines, included=included or ()

@@ -29,6 +29,7 @@ class UrdfLimit:
     velocity: float | None = None  # largest velocity
     acceleration: float | None = None  # largest acceleration, of speeding up and of slowing down
     jerk: float | None = None  # largest jerk
+    torque: float | None = None  # largest torque or force; a cell decides whether the effort counts as such
     soft: StatedLimits = field(default_factory=StatedLimits)  # what the controller keeps within these limits
     position_fault: str = ""  # what is wrong with the positions of the file, if they were not taken for that
     velocity_fault: str = ""  # what is wrong with its velocity, if it was not taken for that

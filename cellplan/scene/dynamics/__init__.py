@@ -1,0 +1,1 @@
+"""Torques and reactions of robots with known masses, and loads on their flanges."""
