@@ -1,6 +1,5 @@
 """Robots with masses, and the same robots in other engines."""
 
-
 import numpy as np
 import pinocchio as pin
 
