@@ -16,8 +16,8 @@ CTRL, SHIFT = 2, 8  # modifiers of keys
 SPOT = """
   const spot = (name, knob) => {
     const handle = app.handles.all.find((one) => one.subject === name);
-    const { at, knobs } = app.handles.knobs(handle);
-    const [x, y, , w] = projected(app.camera.matrix(), knob ? knobs[knob] : at);
+    const { at, motions } = app.handles.place(handle);
+    const [x, y, , w] = projected(app.camera.matrix(), knob ? motions[knob].spot : at);
     const box = byId("canvas").getBoundingClientRect();
     return [box.left + (0.5 + (0.5 * x) / w) * box.width, box.top + (0.5 - (0.5 * y) / w) * box.height];
   };

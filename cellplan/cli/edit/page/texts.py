@@ -8,7 +8,7 @@ from cellplan.report.page.render import PACKAGE, template
 VIEW: Final = "jobs/view/page"  # below the package
 EDIT: Final = "cli/edit/page"
 OF_FILES: Final = frozenset({"bases", "start"})  # scripts of the view page that only pages in files need
-_SCRIPTS: Final = "client fields handles overlay figures outcome live begin"
+_SCRIPTS: Final = "client fields motions handles overlay figures outcome live begin"
 SCRIPTS: Final = _SCRIPTS.split()  # each after those that it needs
 
 

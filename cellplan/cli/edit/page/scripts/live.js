@@ -183,6 +183,7 @@ class LiveApp extends App {
   }
 
   decorated(frame, state) {
+    this.state = state;
     if (!this.answer) return frame;
     return { bodies: [...this.overlay.bodies(state), ...frame.bodies].sort((a, b) => (b.opacity ?? 1) - (a.opacity ?? 1)), lines: [...frame.lines, ...this.overlay.lines(state)] };
   }
@@ -239,6 +240,6 @@ class LivePanels extends Panels {
   /** In place of the closest pair of a run: what is selected. */
   nearestText() {
     const { selected } = this.app.handles;
-    return selected ? [`${selected.subject} is selected: arrow keys move it`] : [];
+    return selected ? [this.app.handles.words()] : [];
   }
 }

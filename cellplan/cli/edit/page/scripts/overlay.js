@@ -5,6 +5,7 @@ const ADVICE_COLOUR = [0.05, 0.6, 0.35, 1];
 const RANGE_COLOUR = [0.1, 0.42, 0.85, 0.55];
 const TILE_COLOURS = { passes: "#55ad7c", collision: "#e6a7a0", speed: "#eccb85", limit: "#b9c0ca", out_of_reach: "#f1f3f6", not_judged: "#8a6fb0" };
 const TILE_TEXTS = { passes: "passes", collision: "collision or too near", speed: "too fast", limit: "beyond a joint limit", out_of_reach: "out of reach", not_judged: "not judged" };
+const RANGE_OPACITY = 0.1;
 const GHOST_OPACITY = 0.22;
 const ARROW_PX = 110; // length of an arrow of advice
 const CIRCLE = Array.from({ length: 49 }, (_, i) => (2 * Math.PI * i) / 48);
@@ -48,7 +49,7 @@ class Overlay {
 
   lines(state) {
     const { answer, handles } = this.app;
-    const lines = [];
+    const lines = this.guideLines();
     if (this.shown.ranges) for (const handle of handles.all) lines.push(...this.rangeLines(handle));
     if (this.shown.handles) for (const handle of handles.all) lines.push(...this.handleLines(handle));
     if (this.shown.advice) for (const advice of answer.advice) lines.push(this.arrow(advice, state));
@@ -56,45 +57,71 @@ class Overlay {
   }
 
   bodies(state) {
-    return [...(this.shown.tiles ? this.tileBodies() : []), ...(this.shown.ghost ? this.ghostBodies(state) : [])];
+    return [...(this.shown.tiles ? this.tileBodies() : []), ...(this.shown.ranges ? this.rangeBodies() : []), ...(this.shown.ghost ? this.ghostBodies(state) : [])];
   }
 
   handleLines(handle) {
-    const { handles } = this.app;
-    const { at, size, knobs } = handles.knobs(handle);
+    const { handles, camera } = this.app;
+    const { at, size, motions } = handles.place(handle);
     const isSelected = handle === handles.selected;
     const width = isSelected ? 4 : 2;
+    const toEye = unit(subtract(camera.eye, at));
     const lines = [];
-    const draw = (points) => lines.push(overlayLine(points, isSelected ? ACCENT : [...ACCENT.slice(0, 3), 0.7], width));
-    if (handle.x || handle.y) draw(circle(at, RING_PX * size));
-    for (const knob of handles.hasKnobs(handle) ? Object.values(knobs) : []) {
-      draw([at, knob]);
-      draw(circle(knob, 6 * size));
-      draw(circle(knob, 2 * size));
+    const draw = (points, isActive = false) => lines.push(overlayLine(points, isSelected ? ACCENT : [...ACCENT.slice(0, 3), 0.7], isActive ? width + 2 : width));
+    if (handles.hasRing(handle)) draw(circle(at, RING_PX * size, ringNormal(motions)));
+    else if (!isSelected) [DOT_PX, 2].forEach((radius) => draw(circle(at, radius * size, toEye)));
+    for (const [part, motion] of handles.hasKnobs(handle) ? Object.entries(motions) : []) {
+      if (!motion.knob) continue;
+      draw([motion.from ?? motion.at, motion.spot]);
+      draw(circle(motion.spot, 6 * size, toEye), isSelected && part === handle.active);
+      draw(circle(motion.spot, 2 * size, toEye));
     }
     return lines;
   }
 
-  /** Where a base may stand: a rectangle, or a piece of a line, in the plane of its base; and how far it may turn. */
+  /** How far what a cell varies may move: an area, a piece of a line, or an arc; of what has no knobs now nothing. */
   rangeLines(handle) {
-    const { x, y, yaw } = handle;
-    const { at, heading } = this.app.handles.place(handle);
+    if (!this.app.handles.hasKnobs(handle)) return [];
+    const { at, motions } = this.app.handles.place(handle);
     const { desired } = this.app;
     const lines = [];
-    const end = (variable, bound, axis) => (
-      variable?.is_varied ? at[axis] + (variable[bound] - desired[variable.address]) / 1000 : at[axis]
-    );
-    if (x?.is_varied || y?.is_varied) {
-      const [a, b, c, d] = [end(x, "lower", 0), end(x, "upper", 0), end(y, "lower", 1), end(y, "upper", 1)];
-      lines.push(overlayLine([[a, c, at[2]], [b, c, at[2]], [b, d, at[2]], [a, d, at[2]], [a, c, at[2]]], RANGE_COLOUR, 2));
-    }
-    if (yaw?.is_varied) {
-      const radius = 0.85 * KNOB_PX * this.app.handles.pixel(at);
-      const [from, to] = [yaw.lower, yaw.upper].map((bound) => heading + radians(bound - desired[yaw.address]));
-      const arc = CIRCLE.map((angle) => from + (angle / (2 * Math.PI)) * (to - from));
-      lines.push(overlayLine([at, ...arc.map((angle) => add(at, times([Math.cos(angle), Math.sin(angle), 0], radius))), at], RANGE_COLOUR, 2));
+    const ends = (part) => {
+      const [variable, { factor = 1 } = {}] = [handle[part], motions[part]];
+      const scale = (variable?.unit === "deg" ? radians(1) : 0.001) * factor;
+      return variable?.is_varied ? [variable.lower, variable.upper].map((bound) => (bound - desired[variable.address]) * scale) : [0, 0];
+    };
+    const along = (part, by) => (motions[part] ? times(motions[part].along, by) : [0, 0, 0]);
+    const [[a, b], [c, d]] = [ends("x"), ends("y")];
+    if (a !== b || c !== d) lines.push(overlayLine([[a, c], [b, c], [b, d], [a, d], [a, c]].map(([x, y]) => add(at, add(along("x", x), along("y", y)))), RANGE_COLOUR, 2));
+    for (const [part, motion] of Object.entries(motions)) {
+      const [low, high] = ends(part);
+      if (low === high || !motion.knob) continue;
+      if (motion.along) lines.push(overlayLine([low, high].map((by) => add(motion.at, times(motion.along, by))), RANGE_COLOUR, 2));
+      else {
+        const from = add(motion.at, times(subtract(motion.spot, motion.at), 0.85));
+        lines.push(overlayLine([motion.at, ...CIRCLE.map((share) => moved(turn(motion.about, low + (share / (2 * Math.PI)) * (high - low), motion.at), from)), motion.at], RANGE_COLOUR, 2));
+      }
     }
     return lines;
+  }
+
+  /** Areas in which bases may stand, tinted. */
+  rangeBodies() {
+    const { stage, handles } = this.app;
+    return handles.all.filter(({ prefix, x, y }) => prefix === "base" && x?.is_varied && y?.is_varied).map(({ index, x, y }) => {
+      const base = stage.bases[index];
+      const middle = ({ lower, upper, address }, i) => base[12 + i] + ((lower + upper) / 2 - this.app.answer.values[address]) / 1000;
+      const place = multiply(translation([middle(x, 0), middle(y, 1), base[14]]), scaling([(x.upper - x.lower) / 1000, (y.upper - y.lower) / 1000, 1]));
+      return { geometry: this.square, place: multiply(place, stage.geometries[this.square].place), colour: ACCENT.slice(0, 3), opacity: RANGE_OPACITY };
+    });
+  }
+
+  /** Lines of other bases on which a dragged one rests. */
+  guideLines() {
+    return this.app.handles.lines.map(({ axis, from }) => {
+      const way = axis ? [1, 0, 0] : [0, 1, 0];
+      return overlayLine([-1, 1].map((sign) => add(from, times(way, 3 * sign * this.app.stage.radius))), ADVICE_COLOUR, 1.5);
+    });
   }
 
   /** Where an arrow of advice begins and ends in the world. */
@@ -165,6 +192,8 @@ function overlayLine(points, colour, width) {
   return { points: Float32Array.from(points.flat()), place: identity(), width, colour, onTop: true, isBrief: true };
 }
 
-function circle(at, radius) {
-  return CIRCLE.map((angle) => [at[0] + radius * Math.cos(angle), at[1] + radius * Math.sin(angle), at[2]]);
+function circle(at, radius, normal) {
+  const first = across(normal);
+  const second = cross(normal, first);
+  return CIRCLE.map((angle) => add(at, add(times(first, radius * Math.cos(angle)), times(second, radius * Math.sin(angle)))));
 }
