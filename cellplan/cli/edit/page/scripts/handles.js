@@ -221,9 +221,9 @@ class Handles {
     if (handle.prefix === "tool") return this.shift(isTurn ? handle.roll : isAcross ? handle.tilt : handle.length, by);
     if (!isArrow) return this.shift(isTurn ? handle.yaw : handle.z, by);
     const { azimuth } = this.app.camera;
-    const wanted = isAcross ? [-Math.sin(azimuth), Math.cos(azimuth), 0] : [-Math.cos(azimuth), -Math.sin(azimuth), 1];
+    const direction = isAcross ? [-Math.sin(azimuth), Math.cos(azimuth), 0] : [-Math.cos(azimuth), -Math.sin(azimuth), 1];
     const { motions } = this.place(handle);
-    const likeness = (part) => (motions[part] ? dot(motions[part].along, wanted) / (motions[part].factor ?? 1) : 0);
+    const likeness = (part) => (motions[part] ? dot(motions[part].along, direction) / (motions[part].factor ?? 1) : 0);
     const [part] = ["x", "y"].sort((a, b) => Math.abs(likeness(b)) - Math.abs(likeness(a)));
     return this.shift(handle[part], Math.sign(likeness(part)) * by);
   }
