@@ -1,11 +1,14 @@
 """Actions of a session that take longer than an answer: work in other processes, and what it offers."""
 
+import contextlib
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from cellplan.errors import InputError
 from cellplan.report.record.common import Record
 from cellplan.session.document import Document
+from cellplan.session.engine import Engine
+from cellplan.session.pictures import picture, picture_of
 from cellplan.session.work import KINDS, Works
 from cellplan.session.works.request import request_of
 
@@ -14,8 +17,9 @@ class Certificate(NamedTuple):
     """What certifying a state has come to."""
 
     values: Mapping[str, object]  # of the state, as far as they differ from the file, by address
-    passed: bool
-    text: str  # the verdict in one line
+    picture: Record  # of the state
+    passed: bool = False
+    text: str = ""  # the verdict in one line
 
 
 class Actions:
@@ -23,6 +27,7 @@ class Actions:
 
     Attributes:
         certificate: The last one of a state, until the file is another one.
+        certified: Picture of the last state that was certified, until then; None without one.
     """
 
     def __init__(self, document: Document) -> None:
@@ -31,7 +36,8 @@ class Actions:
         self._works: Works | None = None
         self._noted = list[Record]()  # events that were not asked for yet
         self.certificate: Certificate | None = None
-        self._certifying: Mapping[str, object] | None = None  # values of the state that is being certified
+        self.certified: Record | None = None
+        self._certifying: Certificate | None = None  # of the state that is being certified
         self._offers = list[Mapping[str, object]]()  # values of trials and remedies, by their numbers
 
     def get_ready(self) -> Works:
@@ -39,13 +45,13 @@ class Actions:
         self._works = self._works or Works(self._document.given)
         return self._works
 
-    def start(self, kind: str, argument: float | None, version: int) -> None:
+    def start(self, kind: str, argument: float | None, engine: Engine) -> None:
         """Begin some work.
 
         Args:
             kind: One of ``KINDS``.
             argument: Seconds of an improvement; of a map the number of the robot, the first operator without one.
-            version: Of the values; stands in the verdict.
+            engine: The values; their version stands in the verdict.
 
         Raises:
             InputError: There is no such robot, or the values do not go together.
@@ -55,7 +61,8 @@ class Actions:
         cell, works = self._document.cell, self.get_ready()
         arguments: tuple[object, ...]
         if kind == "certify":
-            arguments, self._certifying = (cell, version), {**self._document.changes.values}
+            arguments = (cell, engine.version)
+            self._certifying = Certificate({**self._document.changes.values}, picture(engine.record()))
         elif kind == "map":
             operators = [cell.index(task.robot) for task in cell.tasks if task.robot not in cell.positioners]
             number = argument if argument is not None else next(iter(operators), 0)
@@ -91,27 +98,23 @@ class Actions:
             before: What was changed until then, by address.
         """
         if action != "save":
-            self.certificate = self._certifying = None
+            self.certificate = self._certifying = self.certified = None
             return
-        after, certificate = {**self._document.changes.values}, self.certificate
-        self._certifying = after if self._certifying == before else self._certifying
-        if certificate is not None and certificate.values == before:
-            self.certificate = certificate._replace(values=after)
+        after = {**self._document.changes.values}
+        self._certifying, self.certificate = (
+            it._replace(values=after) if it is not None and it.values == before else it
+            for it in (self._certifying, self.certificate)
+        )
 
     def note(self, event: Record | None) -> None:
         """Let an event be among the next ones; nothing for None."""
         self._noted += [] if event is None else [event]
 
-    def events(self) -> list[Record]:
-        """Events since the last call; what is offered has a number to take it by."""
+    def events(self, engine: Engine) -> list[Record]:
+        """Events since the last call; what is offered has a number to take it by, and a picture."""
         noted, self._noted = self._noted, []
         events = self._works.poll() if self._works else []
-        for event in events:
-            if event["event"] == "verdict" and self._certifying is not None:
-                failed = next((line.strip() for line in event["lines"] if "FAILED" in line), event["lines"][0])
-                text = "every check passed" if event["passed"] else failed
-                self.certificate = Certificate(self._certifying, event["passed"], text)
-        return [*noted, *(self._numbered(event) for event in events)]
+        return [*noted, *(self._completed(event, engine) for event in events)]
 
     def close(self) -> None:
         """End all work and all processes."""
@@ -119,15 +122,25 @@ class Actions:
             self._works.close()
         self._works = None
 
-    def _numbered(self, event: Record) -> Record:
-        """An event with the numbers of what it offers."""
+    def _completed(self, event: Record, engine: Engine) -> Record:
+        """An event with the numbers and pictures of what it offers, or the picture of what is certified."""
+        if event["event"] == "verdict" and self._certifying is not None:
+            failed = next((line.strip() for line in event["lines"] if "FAILED" in line), event["lines"][0])
+            text = "every check passed" if event["passed"] else failed
+            self.certificate = self._certifying._replace(passed=event["passed"], text=text)
+            self.certified = self.certificate.picture if event["passed"] else self.certified
+            return {**event, "picture": self.certified}
         if event["event"] == "trial":
-            return {**event, "number": self._offer(event["values"])}
+            return {**event, **self._offer(event["values"], engine)}
         if event["event"] == "remedies":
             remedies: list[Any] = event["remedies"]
-            return {**event, "remedies": [{**it, "number": self._offer(it["values"])} for it in remedies]}
+            return {**event, "remedies": [{**it, **self._offer(it["values"], engine)} for it in remedies]}
         return event
 
-    def _offer(self, values: Mapping[str, object]) -> int:
+    def _offer(self, values: Mapping[str, object], engine: Engine) -> Record:
+        """Number and picture of values that can be taken."""
         self._offers.append(values)
-        return len(self._offers) - 1
+        shown = None
+        with contextlib.suppress(InputError):
+            shown = picture_of(self._document.cell.with_values(values), engine.given, engine.shown)
+        return {"number": len(self._offers) - 1, "picture": shown}

@@ -8,7 +8,6 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
-from cellplan.jobs.repair.neat import written_at
 from cellplan.jobs.view.cell_scene import standing_scene
 from cellplan.jobs.view.describe import base_records
 from cellplan.jobs.view.geometries import Geometries
@@ -71,8 +70,7 @@ class Engine:
 
     def restore(self, cell: Cell) -> None:
         """Work out the shown block at the values of a changed cell, whose robots begin as it says."""
-        written = {it: written_at(cell.origin.document, it.address) for it in self.given.variables.listed}
-        self.move({it.address: float(value) for it, value in written.items() if value not in (None, it.given)})
+        self.move(self.given.variables.written(cell))
         look = self._looks[self.shown]
         stated = stated_start(cell, look.block)
         if np.abs(look.motion.q[0] - stated).max() > SAME_START:

@@ -54,8 +54,9 @@ class Session:
     def open_record(self) -> Record:
         """What a page needs once; a process gets ready for its work meanwhile."""
         self._actions.get_ready()
-        name, file = self.document.cell.name, self.document.path.name
-        return {"schema": SCHEMA, "cell": name, "file": file, **self._engine.page(), "answer": self.answer()}
+        name, file, certified = self.document.cell.name, self.document.path.name, self._actions.certified
+        about = {"schema": SCHEMA, "cell": name, "file": file, "certified": certified}
+        return {**about, **self._engine.page(), "answer": self.answer()}
 
     def change(self, values: Mapping[str, float], *, block: int | None = None, number: int = 0) -> Record:
         """Set values, and say what becomes of the block that is shown.
@@ -122,12 +123,12 @@ class Session:
         elif action in {"stop", "end"}:
             (actions.stop if action == "stop" else self.close)()
         else:
-            actions.start(action, argument, self._engine.version)
+            actions.start(action, argument, self._engine)
         return self.answer()
 
     def poll(self) -> list[Record]:
         """What has happened in the background since it was asked last; it never waits."""
-        events, is_new = self._actions.events(), False
+        events, is_new = self._actions.events(self._engine), False
         for event in events:
             if event["event"] == "verdict":
                 is_new = True

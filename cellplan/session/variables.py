@@ -9,6 +9,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
+from cellplan.jobs.repair.neat import written_at
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.cell.layout import LayoutSettings, VariableKind, VaryRange
 from cellplan.model.cell.mounting import Hanger, Pedestal
@@ -96,6 +97,11 @@ class LiveVariables:
         if (variable := self.at(address)) is None:
             raise InputError(f"{address}: expected the address of a number that may be changed, got another one")
         return variable
+
+    def written(self, cell: Cell) -> dict[str, float]:
+        """Values in file units of a changed cell by address, as far as they are others than here."""
+        at = {it: written_at(cell.origin.document, it.address) for it in self.listed}
+        return {it.address: float(value) for it, value in at.items() if value not in (None, it.given)}
 
     def numbers(self, values: Mapping[str, float]) -> Array:
         """The variables of the layout in [m] and [rad], as given where no value in file units is, shape (n,)."""

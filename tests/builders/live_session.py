@@ -79,9 +79,10 @@ class FakeSession:
         """Certify at once; anything else changes nothing."""
         if action == "certify":
             self.state = "certified"
-            self.events.put(
-                {"event": "verdict", "work": "certify", "version": self.version, "passed": True, "lines": []}
-            )
+            answer = deepcopy(self.record["answer"])
+            shown = {**{key: answer[key] for key in ("values", "poses")}, "motions": {"0": answer["motion"]}}
+            verdict = {"event": "verdict", "work": "certify", "version": self.version, "passed": True}
+            self.events.put({**verdict, "lines": [], "picture": shown})
         return self.answer()
 
 
@@ -124,7 +125,9 @@ def fake_session(cell: Path) -> FakeSession:
         "can": {"undo": True, "redo": False, "save": True},
     }
     opened = {"schema": "cellplan.edit/1", "cell": record["cell"], "file": cell.name, "view": record}
-    session = FakeSession({**opened, "variables": variables, "blocks": [], "demands": {}, "answer": answer})
+    session = FakeSession(
+        {**opened, "variables": variables, "blocks": [], "demands": {}, "certified": None, "answer": answer}
+    )
     session.answer()
     return session
 

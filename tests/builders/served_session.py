@@ -7,7 +7,6 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from builders.browser import READY, Browser
-
 from cellplan.cli.edit.owner import Owner
 from cellplan.cli.edit.page.texts import page_texts
 from cellplan.cli.edit.server import Server, loopback_listener

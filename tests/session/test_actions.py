@@ -1,10 +1,12 @@
 """Heavy work of a session: verdicts become states of answers, trials and remedies become changes."""
 
 import time
+from base64 import b64decode
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from builders.editor import coarse_pair
 
@@ -43,6 +45,24 @@ def test_a_certified_state_is_so_until_it_is_changed_and_again_when_that_is_undo
     assert [(it["state"], it["verdict"]) for it in answers] == [("certified", "certified: every check passed")]
     assert session.change({X: 1901.0})["state"] == "planned"
     assert session.do("undo")["state"] == "certified"
+
+
+def test_the_picture_of_the_certified_state_is_there_for_pages_that_open_later(session: Session) -> None:
+    before = session.open_record()
+    session.do("certify")
+    certified = session.change({X: 1901.0})  # the verdict is of the state before
+    events = events_of(session, "certify")
+    [verdict] = [event for event in events if event["event"] == "verdict"]
+    opened = session.open_record()
+
+    assert before["certified"] is None
+    assert verdict["picture"] == opened["certified"]
+    shown, was, now = (it["poses"]["bases"] for it in (opened["certified"], before["answer"], certified))
+    assert shown == was != now
+    assert opened["certified"]["motions"] == {"0": before["answer"]["motion"]}
+    assert opened["certified"]["values"][X] == 1900.0
+    session.do("reload")
+    assert session.open_record()["certified"] is None
 
 
 def test_a_saved_state_stays_certified(session: Session) -> None:
@@ -87,9 +107,9 @@ def test_a_remedy_that_is_taken_passes_and_can_be_undone(cells: Path, tmp_path: 
         first = session.answer()
         session.do("repair")
         [event] = [event for event in events_of(session, "repair") if event["event"] == "remedies"]
-        numbers = [remedy["number"] for remedy in event["remedies"]]
+        remedy = event["remedies"][-1]
 
-        answer = session.do("take", numbers[-1])
+        answer = session.do("take", remedy["number"])
 
         assert answer["history"]
         assert answer["can"]["undo"]
@@ -100,6 +120,22 @@ def test_a_remedy_that_is_taken_passes_and_can_be_undone(cells: Path, tmp_path: 
         undone = session.do("undo")
         assert undone["history"] == []
         assert undone["values"] == first["values"]
+
+
+def test_a_trial_comes_with_the_picture_of_the_layout_that_it_offers(cells: Path) -> None:
+    with Session.open(cells / "four_robots_initial.yaml") as session:
+        session.do("improve", 0.1)
+        trials = list[Event]()
+        while not trials:
+            trials = [event for event in session.poll() if event["event"] == "trial"]
+            time.sleep(0.01)
+        session.do("stop")
+        offered, answer = trials[0]["picture"], session.do("take", trials[0]["number"])
+
+    assert offered["values"] == answer["values"]
+    assert offered["poses"] == answer["poses"]
+    shown, taken = (np.frombuffer(b64decode(it["q"]), "<f4") for it in (offered["motions"]["0"], answer["motion"]))
+    assert taken == pytest.approx(shown, abs=1e-3)  # of a motion that came from one nearby
 
 
 def test_a_map_is_of_a_robot_with_a_task(session: Session) -> None:

@@ -1,4 +1,4 @@
-"""Handles of the live cell in headless Chromium, against a true session: what they say moves is what its values move."""
+"""Handles of the live cell in headless Chromium, against a true session: they move what its values move."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -29,7 +29,8 @@ MOVED = f"""
   const links = state.links[handle.index];
   const carrier = (record) => {{
     if (prefix === "tool") return multiply(links[robot.tip_link + 1], fromRows(record.tools[handle.index]));
-    if (prefix === "part") return multiply(state.links[app.stage.scene.part[0].robot][app.stage.scene.part[0].link + 1], fromRows(record.part));
+    const [holder] = app.stage.scene.part;
+    if (prefix === "part") return multiply(state.links[holder.robot][holder.link + 1], fromRows(record.part));
     return fromRows(record.bases[handle.index]);
   }};
   const points = poses.map((record) => moved(carrier(record), POINT));
@@ -45,8 +46,10 @@ OF_START = """
   const robot = app.stage.scene.robots[handle.index];
   const tip = (q) => tipOf(robot, linkPoses(robot, app.stage.bases[handle.index], q));
   return Object.entries(motions).map(([part, { along, about, at, factor }]) => {
-    const ends = [-1e-5, 1e-5].map((step) => tip(state.q.map((value, i) => value + (i === robot.column + Number(part.slice(5)) ? step : 0))));
-    return [times(subtract(ends[1], ends[0]), 5e4), times(about ? cross(about, subtract(tip(state.q), at)) : along, factor)];
+    const joint = robot.column + Number(part.slice(5));
+    const ends = [-1e-5, 1e-5].map((step) => tip(state.q.map((value, i) => value + (i === joint ? step : 0))));
+    const rate = about ? cross(about, subtract(tip(state.q), at)) : along;
+    return [times(subtract(ends[1], ends[0]), 5e4), times(rate, factor)];
   });
 """
 SPOT = """
@@ -116,7 +119,9 @@ def drag(page: Browser, part: str, by: tuple[float, float]) -> tuple[Any, Any]:
     page.pointer("Pressed", x, y)
     for share in (0.3, 0.6, 1.0):
         page.pointer("Moved", x + share * by[0], y + share * by[1])
-    page.run("await drawn(); while (app.client.isSending) await drawn(); await new Promise((go) => setTimeout(go, 200));")
+    page.run(
+        "await drawn(); while (app.client.isSending) await drawn(); await new Promise((go) => setTimeout(go, 200));"
+    )
     after = page.run(spot)
     page.pointer("Released", x + by[0], y + by[1])
     return (x, y), after

@@ -65,6 +65,9 @@ def test_certified_is_said_by_the_checks_of_solve_and_ends_with_the_next_change(
     rest(page, "app.answer.state !== 'certified' && app.answer.is_settled")
     assert page.text("state") in {"○ planned", "✗ fails", "✗ breaks off"}
     assert page.text("outcome").startswith("of the state before the last change:")
+    page.run("location.reload();")
+    rest(page, "window.app?.answer?.is_settled")
+    assert page.run("return app.overlay.ghostBodies(app.stage.at(0), app.overlay.ghost, FIXED_COLOUR).length;") > 0
 
 
 def test_saving_writes_into_the_file_with_its_comments_and_undo_gives_the_value_back(page: Browser, path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -189,7 +190,7 @@ def test_certified_holds_until_the_next_change_and_its_state_stays_as_a_ghost(pa
     seen = []
     for step in ("", "await app.act('certify');", "app.change({ 'robots.left.base.x_mm': 300 });"):
         page.run(f"{step} {IDLE} await new Promise((go) => setTimeout(go, 700));")
-        ghosts = page.run("return app.overlay.ghostBodies(app.stage.at(0)).length;")
+        ghosts = page.run("return app.overlay.ghostBodies(app.stage.at(0), app.overlay.ghost, FIXED_COLOUR).length;")
         seen.append((page.text("state"), page.run("return byId('state').className;"), ghosts > 0))
 
     assert seen == [
@@ -224,7 +225,7 @@ def test_advice_is_an_arrow_and_a_button_that_moves_the_base(page: Browser, sess
 TILE = {"x_mm": 0, "y_mm": 0, "value": 1, "state": "passes"}
 EVENTS: list[dict[str, Any]] = [
     {"event": "progress", "work": "improve", "fraction": 0.5, "text": "trial 3"},
-    {"event": "trial", "work": "improve", "text": "margin 12 deg", "values": {"robots.left.base.x_mm": 44}},
+    {"event": "trial", "work": "improve", "text": "margin 12 deg", "number": 3, "picture": None},
     {"event": "tiles", "robot": "left", "size_mm": 200, "tiles": [TILE]},
     {"event": "file", "state": "conflict", "text": "the file was changed"},
 ]
@@ -243,8 +244,29 @@ def test_events_show_progress_trials_tiles_and_the_question_of_a_conflict(page: 
     page.run("await new Promise((go) => setTimeout(go, 100));" + IDLE)
 
     assert seen == ["improve: trial 3", 1, "file-reload"]
-    assert changes(session) == [{"robots.left.base.x_mm": 44}]
+    assert ("/do", {"action": "take", "argument": 3}) in session.received
     assert ("/do", {"action": "keep"}) in session.received
+
+
+def test_an_offered_layout_is_in_the_picture_while_its_line_is_pointed_at(page: Browser, session: FakeSession) -> None:
+    answer = session.record["answer"]
+    for number, by in enumerate((0.0, 0.3)):
+        bases = deepcopy(answer["poses"]["bases"])
+        bases[0][3] += by
+        shown = {
+            "values": answer["values"],
+            "poses": {**answer["poses"], "bases": bases},
+            "motions": {"0": answer["motion"]},
+        }
+        session.events.put({"event": "trial", "work": "improve", "text": f"{by}", "number": number, "picture": shown})
+    page.run("while (byId('outcome').querySelectorAll('button').length < 2) await drawn();")
+    offered = "app.overlay.ghostBodies(app.stage.at(0), app.overlay.offer, FIXED_COLOUR)"
+    newest, line = page.run(f"return [{offered}.length, app.overlay.offerLines()[0].points];")
+    page.run("byId('outcome').querySelector('button').focus();")
+
+    assert newest > 0
+    assert line["3"] - line["0"] == pytest.approx(0.3, abs=1e-6)
+    assert page.run(f"return {offered}.length;") == 0  # of the first one nothing stands elsewhere
 
 
 def test_an_answer_that_another_page_caused_arrives(page: Browser, session: FakeSession) -> None:

@@ -41,6 +41,7 @@ class LiveApp extends App {
     this.bases.setScene();
     this.handles.setScene();
     this.overlay.setScene();
+    this.overlay.keepGhost(record.certified);
     this.apply(record.answer);
   }
 
@@ -68,7 +69,6 @@ class LiveApp extends App {
     this.desired = isBusy || this.handles.held ? { ...answer.values, ...this.desired } : { ...answer.values };
     this.outcome.age(answer.version);
     this.pose(answer);
-    if (answer.state === "certified") this.overlay.keepGhost(answer);
     this.bases.update(this.desired);
     this.figures.show(answer);
     this.controls.setScene();
@@ -76,14 +76,12 @@ class LiveApp extends App {
   }
 
   /** Bring robots, tools, part and obstacles where an answer has them. */
-  pose({ motion, poses, is_settled: isSettled }) {
+  pose({ motion, poses, values, is_settled: isSettled }) {
     const { stage } = this;
     const { scene } = stage;
     poses.bases.forEach((pose, robot) => { stage.bases[robot] = fromRows(pose); });
     poses.tools.forEach((pose, robot) => { scene.robots[robot].tip = pose; });
-    scene.bodies.forEach((body, index) => {
-      stage.poses[index] = multiply(fromRows(poses.bodies[index] ?? body.pose), scaling([1, 1, this.stretch(body)]));
-    });
+    stage.poses = this.bodyPoses(poses, values);
     scene.part[0].pose = poses.part ?? scene.part[0].pose;
     if (motion) {
       stage.motion = new Motion(motion);
@@ -94,13 +92,18 @@ class LiveApp extends App {
     if (isSettled) stage.sight = new Sight(stage);
   }
 
+  /** Poses of all bodies at some values. */
+  bodyPoses(poses, values) {
+    return this.stage.scene.bodies.map((body, index) => multiply(fromRows(poses.bodies[index] ?? body.pose), scaling([1, 1, this.stretch(body, values)])));
+  }
+
   /** By how much the rod of a tool is longer than in the file, as a factor. */
-  stretch(body) {
+  stretch(body, values) {
     const { capsule } = this.record.geometries[body.geometry] ?? {};
     const rod = body.kind === "tool" && capsule && this.rods.get(this.stage.scene.robots[body.robot].name);
     if (!rod) return 1;
     const [radius, line] = capsule;
-    return 1 + (this.answer.values[rod.address] - rod.given) / 1000 / (line + 2 * radius);
+    return 1 + (values[rod.address] - rod.given) / 1000 / (line + 2 * radius);
   }
 
   /** Change values by address, within their ranges; locked ones stay. */

@@ -20,7 +20,10 @@ class Outcome {
       answer: () => this.app.apply(event.answer),
       progress: () => this.progress(event),
       verdict: () => this.verdict(event),
-      trial: () => this.offer(event.text, event),
+      trial: () => {
+        this.offer(event.text, event);
+        this.app.overlay.showOffer(event.picture);
+      },
       remedies: () => this.remedies(event.remedies),
       tiles: () => {
         this.app.overlay.putTiles(event);
@@ -66,8 +69,9 @@ class Outcome {
     byId("stop").disabled = this.rows.size === 0;
   }
 
-  verdict({ passed, lines, version }) {
+  verdict({ passed, lines, version, picture }) {
     this.done("certify");
+    if (passed) this.app.overlay.keepGhost(picture);
     this.clear();
     this.judged = version;
     this.say(passed ? "certified: all checks of solve passed" : "not certified: checks of solve failed", passed ? "good" : "mark");
@@ -89,10 +93,11 @@ class Outcome {
     for (const remedy of remedies) this.offer(`${remedy.title}: ${remedy.text}`, remedy);
   }
 
-  /** A button that takes what is offered: by its number where the session has one for it, else by its values. */
-  offer(text, { number, values }) {
+  /** A button that takes what is offered, by its number; pointed at or focused, its layout is in the picture. */
+  offer(text, { number, picture }) {
     const button = element("button", { type: "button", className: "jump", textContent: text });
-    button.addEventListener("click", () => (number === undefined ? this.app.change(values) : this.app.act("take", number)));
+    button.addEventListener("click", () => this.app.act("take", number));
+    for (const kind of ["pointerenter", "focus"]) button.addEventListener(kind, () => this.app.overlay.showOffer(picture));
     byId("outcome").append(element("li", {}, button));
     byId("outcome-panel").hidden = false;
   }
@@ -104,6 +109,7 @@ class Outcome {
 
   clear() {
     this.judged = null;
+    this.app.overlay.showOffer(null);
     byId("outcome").replaceChildren();
     byId("outcome").classList.remove("old");
   }

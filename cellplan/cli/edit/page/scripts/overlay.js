@@ -1,4 +1,4 @@
-// What the live cell adds to the picture: handles, ranges, arrows of advice, tiles of a map, and the last certified state.
+// What the live cell adds to the picture: handles, ranges, advice, tiles of a map, the certified state, and what is offered.
 
 const ACCENT = [0.1, 0.42, 0.85, 1];
 const ADVICE_COLOUR = [0.05, 0.6, 0.35, 1];
@@ -7,15 +7,17 @@ const TILE_COLOURS = { passes: "#55ad7c", collision: "#e6a7a0", speed: "#eccb85"
 const TILE_TEXTS = { passes: "passes", collision: "collision or too near", speed: "too fast", limit: "beyond a joint limit", out_of_reach: "out of reach", not_judged: "not judged" };
 const RANGE_OPACITY = 0.1;
 const GHOST_OPACITY = 0.22;
+const ELSEWHERE = 0.01; // rad or m of a joint at the begin: seen
 const ARROW_PX = 110; // length of an arrow of advice
 const CIRCLE = Array.from({ length: 49 }, (_, i) => (2 * Math.PI * i) / 48);
 
 class Overlay {
   constructor(app) {
     this.app = app;
-    this.shown = { handles: true, ranges: true, advice: true, tiles: true, ghost: true };
+    this.shown = { handles: true, ranges: true, advice: true, tiles: true, ghost: true, offers: true };
     this.tiles = new Map(); // by place
-    this.ghost = null; // motion, bases and tips of the last certified state
+    this.ghost = null; // the last certified state
+    this.offer = null; // layout that a line of the results offers
   }
 
   /** Prepare for another cell: a square for the tiles. */
@@ -27,13 +29,26 @@ class Overlay {
     this.tiles.clear();
     this.rectangles = [];
     byId("legend").replaceChildren();
-    this.ghost = null;
+    this.ghost = this.offer = null;
   }
 
-  /** Remember a state that is certified. */
-  keepGhost(answer) {
-    const { stage } = this.app;
-    this.ghost = { motion: stage.motion, bases: [...stage.bases], poses: [...stage.poses], values: { ...answer.values } };
+  /** Remember the picture of the last state that is certified; none yet for null. */
+  keepGhost(picture) {
+    this.ghost = this.prepared(picture);
+  }
+
+  /** Show a layout that is offered; none for null. */
+  showOffer(picture) {
+    this.offer = this.prepared(picture);
+    this.app.refresh();
+  }
+
+  /** A picture of other values, ready to be drawn. */
+  prepared(picture) {
+    if (!picture) return null;
+    const { values, poses, motions } = picture;
+    const made = Object.entries(motions).map(([block, motion]) => [block, new Motion(motion)]);
+    return { bases: poses.bases.map(fromRows), tools: poses.tools, poses: this.app.bodyPoses(poses, values), motions: Object.fromEntries(made) };
   }
 
   putTiles(event) {
@@ -52,12 +67,13 @@ class Overlay {
     const lines = this.guideLines();
     if (this.shown.ranges) for (const handle of handles.all) lines.push(...this.rangeLines(handle));
     if (this.shown.handles) for (const handle of handles.all) lines.push(...this.handleLines(handle));
+    if (this.shown.offers) lines.push(...this.offerLines());
     if (this.shown.advice) for (const advice of answer.advice) lines.push(this.arrow(advice, state));
     return lines;
   }
 
   bodies(state) {
-    return [...(this.shown.tiles ? this.tileBodies() : []), ...(this.shown.ranges ? this.rangeBodies() : []), ...(this.shown.ghost ? this.ghostBodies(state) : [])];
+    return [...(this.shown.tiles ? this.tileBodies() : []), ...(this.shown.ranges ? this.rangeBodies() : []), ...(this.shown.ghost ? this.ghostBodies(state, this.ghost, FIXED_COLOUR) : []), ...(this.shown.offers ? this.ghostBodies(state, this.offer, ADVICE_COLOUR.slice(0, 3)) : [])];
   }
 
   handleLines(handle) {
@@ -152,20 +168,38 @@ class Overlay {
     });
   }
 
-  /** Robots whose base has moved since, where the certified state has them at this instant. */
-  ghostBodies(state) {
-    if (!this.ghost) return [];
-    const { stage, view } = this.app;
+  /** From each base to where an offered layout has it. */
+  offerLines() {
+    const { bases } = this.app.stage;
+    const pairs = this.offer ? bases.map((base, robot) => [base, this.offer.bases[robot]]).filter(([now, then]) => differ(now, then)) : [];
+    return pairs.map(([now, then]) => overlayLine([origin(now), origin(then)], ADVICE_COLOUR, 3));
+  }
+
+  /** What stands or moves elsewhere in another picture, at this instant; of blocks without a motion there the bases. */
+  ghostBodies(state, ghost, colour) {
+    const { stage, view, answer } = this.app;
+    if (!ghost || !view) return [];
     const { scene } = stage;
-    const moved = new Set([...scene.robots.keys()].filter((robot) => stage.bases[robot].some((value, i) => Math.abs(value - this.ghost.bases[robot][i]) > 1e-6)));
-    if (moved.size === 0 || !view) return [];
-    const links = allLinks(scene.robots, this.ghost.bases, this.ghost.motion.at(Math.min(state.t, this.ghost.motion.end)));
+    const motion = ghost.motions[answer.block];
+    const moved = scene.robots.map((robot, index) => {
+      const own = (q) => [...q.subarray(robot.column, robot.column + robot.joints.length)];
+      const begins = motion && stage.motion.count ? [stage.motion.row(0), motion.row(0)].map(own) : [[], []];
+      return differ(stage.bases[index], ghost.bases[index]) || differ(robot.tip, ghost.tools[index]) || differ(...begins, ELSEWHERE);
+    });
+    const links = allLinks(scene.robots, ghost.bases, motion ? motion.at(Math.min(state.t, motion.end)) : state.q);
     return scene.bodies.flatMap((body, index) => {
-      if (!moved.has(body.robot) || body.kind === "part" || body.kind === "pedestal" || stage.isPlane(body)) return [];
-      const place = multiply(carriedPose(links, body, this.ghost.poses[index]), stage.geometries[body.geometry].place);
-      return [{ geometry: body.geometry, place, colour: FIXED_COLOUR, opacity: GHOST_OPACITY }];
+      if (body.kind === "part" || body.kind === "pedestal" || stage.isPlane(body)) return [];
+      const isElsewhere = body.robot === WORLD ? differ(stage.poses[index], ghost.poses[index]) : moved[body.robot] && (motion || body.link < 0);
+      if (!isElsewhere) return [];
+      const place = multiply(carriedPose(links, body, ghost.poses[index]), stage.geometries[body.geometry].place);
+      return [{ geometry: body.geometry, place, colour, opacity: GHOST_OPACITY }];
     });
   }
+}
+
+/** Whether two lists of numbers are different. */
+function differ(some, others, by = 1e-6) {
+  return some.some((value, i) => Math.abs(value - others[i]) > by);
 }
 
 /** Tiles of one size and state that are neighbours in a row, as one: their middle and width in mm. */
