@@ -7,7 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from socket import socket
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cellplan.cli.options import shared
 from cellplan.cli.options.request import Options, option
@@ -17,6 +17,8 @@ from cellplan.errors import ExitStatus
 
 if TYPE_CHECKING:
     from cellplan.report.record.common import Record
+
+LOADED_WITHIN_S: Final = 60.0  # [s] a browser that was opened has to load the page
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +52,7 @@ def _served(options: EditOptions, listener: socket) -> Result:
     """Serve the page until the session is ended."""
     from cellplan.cli.edit.owner import Owner
     from cellplan.cli.edit.page.texts import page_texts
-    from cellplan.cli.edit.redirect import redirect_file
+    from cellplan.cli.edit.redirect import redirect_file, remove_when
     from cellplan.cli.edit.server import Server
     from cellplan.session.session import Session
 
@@ -60,7 +62,7 @@ def _served(options: EditOptions, listener: socket) -> Result:
     with closing(Session.open(options.cell, settings=options.settings, allow_dirs=options.allow_dirs)) as session:
         owner = Owner(session, server.publish)
         with redirect_file(f"{place}/#token={token}") as path, server.serving(owner.submit):
-            _introduce(options, place, token, path)
+            remove_when(owner.is_open, path, _introduce(options, place, token, path))
             try:
                 owner.run()
                 owner.end("the session was ended in a page")
@@ -70,16 +72,21 @@ def _served(options: EditOptions, listener: socket) -> Result:
     return Result(ExitStatus.PASSED, ["editing ended", *_unsaved(owner.answer)], {}, is_verdict=False)
 
 
-def _introduce(options: EditOptions, place: str, token: str, path: Path) -> None:
-    """Say where the page is and open it; the token is shown on a terminal only, and only where no browser is opened."""
+def _introduce(options: EditOptions, place: str, token: str, path: Path) -> float | None:
+    """Say where the page is and open it; the token is shown on a terminal only, and only where no browser is opened.
+
+    Returns the time in [s] after which the file that leads to the page has served; None where a person opens it.
+    """
     from cellplan.cli.edit.redirect import can_open_browser, open_browser
 
     tell(f"editing {options.cell} at {place}: Ctrl-C ends")
-    tell(f"open {path} in a browser, also for further tabs; only you can read it")
+    tell(f"open {path} in a browser: only you can read it, and it is removed once the page has loaded")
     if not options.no_browser and can_open_browser():
         open_browser(path)
-    elif sys.stderr.isatty():
+        return LOADED_WITHIN_S
+    if sys.stderr.isatty():
         tell(f"or paste, as it would be visible to others in a command: {place}/#token={token}")
+    return None
 
 
 def _unsaved(answer: "Record") -> Iterator[str]:

@@ -46,11 +46,13 @@ class Owner:
 
     Attributes:
         answer: The last answer; empty before the first one.
+        is_open: Set once a page has the cell.
     """
 
     def __init__(self, session: LiveSession, publish: Publish) -> None:
         """Take over a session; ``publish`` sends an event to all pages but one."""
         self.answer: Record = {}
+        self.is_open = threading.Event()
         self._session, self._publish = session, publish
         self._jobs: deque[Job] = deque()
         self._arrived = threading.Condition()
@@ -122,6 +124,7 @@ class Owner:
         if job.path == OPEN:
             record = self._session.open_record()
             self.answer = record["answer"]
+            self.is_open.set()
             return record
         if job.path == DO:
             record = self._session.do(job.action, job.argument)

@@ -1,6 +1,7 @@
 """A file that leads a browser to the page with the token of the session, which no other user can read.
 
-The address itself would be an argument of the browser's process, and those are visible to all users of a machine.
+The address itself would be an argument of the browser's process, and those are visible to all users of a machine. The
+file is removed once the page has loaded, so that a program that is killed leaves none with its dead token.
 """
 
 import contextlib
@@ -37,13 +38,30 @@ def redirect_file(address: str) -> Iterator[Path]:
     path = _private_file(FOLDER) or _private_file(Path(tempfile.gettempdir()))
     if path is None:
         raise InputError("TMPDIR: expected a folder that keeps files from other users, got none that does")
+    path = path.resolve()
     try:
         path.write_text(REDIRECT.format(address=escape(address)), encoding="utf-8")
-        yield path.resolve()
+        yield path
     finally:
-        path.unlink(missing_ok=True)
+        _remove(path)
+
+
+def remove_when(is_loaded: threading.Event, path: Path, within_s: float | None) -> None:
+    """Remove a file in the background once its page has loaded, or after a time in [s]; None for however long."""
+
+    def wait() -> None:
+        is_loaded.wait(within_s)
+        _remove(path)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def _remove(path: Path) -> None:
+    """Remove a file, and its folder if nothing else is in it."""
+    path.unlink(missing_ok=True)
+    if path.parent.name == FOLDER.name:
         with contextlib.suppress(OSError):
-            FOLDER.rmdir()  # if nothing else is in it
+            path.parent.rmdir()
 
 
 def _private_file(folder: Path) -> Path | None:

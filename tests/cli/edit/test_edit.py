@@ -3,10 +3,12 @@
 import json
 import os
 import re
+import shutil
 import signal
 import stat
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from http.client import HTTPConnection
@@ -117,9 +119,9 @@ def test_the_token_is_in_a_private_file_only_and_what_is_not_saved_is_said(pair:
     recorder.chmod(0o755)
     program, before = started(pair, BROWSER=str(recorder)), pair.read_bytes()
 
+    mode, place = stat.S_IMODE(program.file.stat().st_mode), program.file.as_uri()
     address, answer = program.moved()
     shown = program.arguments_of_processes()
-    mode, place = stat.S_IMODE(program.file.stat().st_mode), program.file.as_uri()
 
     assert (mode, program.end()) == (0o600, 130)
     assert "cellplan\0edit\0pair.yaml" in shown
@@ -148,13 +150,57 @@ def test_a_terminal_shows_the_address_where_no_browser_is_opened(pair: Path, sta
     assert program.output == "editing ended\n"
 
 
+def until_removed(file: Path) -> None:
+    """Wait until the file that led to the page is gone."""
+    deadline = time.monotonic() + LIMIT_S
+    while file.exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def as_nobody(*command: str) -> subprocess.CompletedProcess[str]:
+    """Run a command as a user who is neither root nor this one."""
+    drop = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", "--"]
+    return subprocess.run([*drop, *command], capture_output=True, text=True, timeout=LIMIT_S, check=False)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.getuid() != 0 or shutil.which("setpriv") is None, reason="only root can be another user")
+def test_another_user_learns_nothing_of_the_session_and_reaches_nothing_of_it(started: Any, pair: Path) -> None:
+    with tempfile.TemporaryDirectory() as name:  # unlike the folders of pytest, one that all users may enter
+        folder = Path(name)
+        folder.chmod(0o755)
+        shutil.copy(pair, folder / "pair.yaml")
+        program = started(folder / "pair.yaml", "--no-browser")
+        address = f"http://127.0.0.1:{program.port}"
+
+        assert as_nobody("cat", str(folder / "pair.yaml")).returncode == 0  # the test could fail
+        refused = as_nobody("cat", str(program.file))
+        assert (refused.stdout, "denied" in refused.stderr) == ("", True)
+        processes = as_nobody("ps", "-eo", "args", "ww").stdout
+        assert "cellplan edit pair.yaml" in processes
+        assert program.token not in processes
+        environment = as_nobody("cat", f"/proc/{program.process.pid}/environ")
+        assert environment.returncode != 0
+        assert program.token not in as_nobody("curl", "-s", address).stdout
+        for token in ("", "x" * 43):
+            headers = [f"Origin: {address}", "Content-Type: application/json", f"X-Cellplan-Token: {token}"]
+            options = [part for header in headers for part in ("-H", header)]
+            answer = as_nobody("curl", "-s", "-w", "%{http_code}", *options, "-d", "{}", f"{address}/open").stdout
+            assert answer.endswith("403")
+            assert "pair" not in answer
+        assert program.file.exists()  # it is there until a page with the token has loaded
+        assert program.post("/open", {})[0] == 200
+        until_removed(program.file)
+
+
 @pytest.mark.slow
 def test_a_killed_program_leaves_the_file_as_it_was_and_a_dead_token(pair: Path, started: Any) -> None:
     first, before = started(pair, "--no-browser"), pair.read_bytes()
     first.moved()
+    until_removed(first.file)
     first.process.kill()
     first.process.wait(timeout=LIMIT_S)
-    first.file.unlink()
 
     second = started(pair, "--port", first.port)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.browser import READY, Browser
-from builders.live_session import LOST_FROM, FakeSession, fake_session, serving
+from builders.live_session import LOST_FROM, TOKEN, FakeSession, fake_session, serving
 
 pytestmark = pytest.mark.slow
 
@@ -125,6 +125,17 @@ def test_values_stay_on_the_grid_and_in_their_range(page: Browser, session: Fake
     assert [values[f"robots.left.base.{axis}_mm"] % 50.0 for axis in "xy"] == [0.0, 0.0]
     assert values["robots.left.base.x_mm"] != 0.0
     assert values["robots.right.base.x_mm"] == 2900.0  # the end of its range
+
+
+def test_another_tab_gets_the_token_in_the_fragment_of_its_address(page: Browser) -> None:
+    opened = page.run("""
+      const opened = [];
+      window.open = (...what) => opened.push(what);
+      byId("tab").click();
+      return opened;
+    """)
+
+    assert opened == [[f"/#token={TOKEN}", "_blank", "noopener"]]
 
 
 def test_what_is_locked_has_no_handle_and_no_open_field(page: Browser, session: FakeSession) -> None:

@@ -2,12 +2,14 @@
 
 import os
 import stat
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
 from cellplan.cli.edit import redirect
-from cellplan.cli.edit.redirect import redirect_file
+from cellplan.cli.edit.redirect import redirect_file, remove_when
 
 ADDRESS = "http://127.0.0.1:4711/#token=secret"
 
@@ -31,6 +33,22 @@ def test_the_file_is_private_from_its_first_byte_and_goes_in_the_end(folder: Pat
         os.umask(old)
 
     assert sorted(folder.iterdir()) == [folder / "tmp"]
+
+
+@pytest.mark.parametrize("within_s", [None, 0.01])
+def test_the_file_goes_when_its_page_has_loaded_or_after_a_time(folder: Path, within_s: float | None) -> None:
+    is_loaded = threading.Event()
+    with redirect_file(ADDRESS) as path:
+        remove_when(is_loaded, path, within_s)
+        if within_s is None:
+            time.sleep(0.05)
+            assert path.exists()
+            is_loaded.set()
+        deadline = time.monotonic() + 10.0
+        while (folder / "outputs").exists() and time.monotonic() < deadline:
+            time.sleep(0.005)
+
+        assert sorted(folder.iterdir()) == [folder / "tmp"]
 
 
 def test_two_sessions_have_two_files_and_other_outputs_stay(folder: Path) -> None:

@@ -17,6 +17,7 @@ class LiveApp extends App {
     for (const action of BUTTONS) byId(action).addEventListener("click", () => this.act(action));
     byId("file-reload").addEventListener("click", () => this.act("reload"));
     byId("file-keep").addEventListener("click", () => this.act("keep"));
+    byId("tab").addEventListener("click", () => open(`/#token=${client.token}`, "_blank", "noopener"));
     byId("copy").addEventListener("click", () => navigator.clipboard?.writeText(byId("history").value));
     for (const name of Object.keys(this.overlay.shown)) {
       byId("show-live").append(checkbox(name, true, (isOn) => {
