@@ -8,6 +8,7 @@ motion with that jerk. The motion is then made slower as a whole until every lim
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Final, Protocol, Self
 
 import numpy as np
@@ -26,7 +27,8 @@ from cellplan.planning.timing.fixed_rates import (
     whole_steps,
 )
 from cellplan.planning.timing.path_length import PathStretch, stretches
-from cellplan.planning.timing.speed_profile import SpeedProfile, fastest_profile
+from cellplan.planning.timing.speed_profile import PathLoads, SpeedProfile, fastest_profile
+from cellplan.planning.timing.torque_limits import TorqueLimits
 
 POINTS_PER_ROW: Final = 5  # [-] lengths for every row of the tables at first; at least doubled once
 FEWEST_POINTS: Final = 400  # [-] lengths of a stretch
@@ -61,25 +63,28 @@ class JointLimitsInTime:
     acceleration: Array
     jerk: Array
     points: tuple[PointSpeeds, ...] = ()  # points of the robots of which the speed in the world is limited too
+    torques: tuple[TorqueLimits, ...] = ()  # of the robots of which torques are limited too
 
     def of(self, columns: slice) -> Self:
         """Those of some joints."""
+
+        def is_among(own: slice) -> bool:
+            return columns.start <= own.start and own.stop <= columns.stop
+
         return replace(
             self,
             velocity=self.velocity[columns],
             acceleration=self.acceleration[columns],
             jerk=self.jerk[columns],
-            points=tuple(
-                it.among(columns)
-                for it in self.points
-                if columns.start <= it.columns.start and it.columns.stop <= columns.stop
-            ),
+            points=tuple(it.among(columns) for it in self.points if is_among(it.columns)),
+            torques=tuple(it.among(columns) for it in self.torques if is_among(it.columns)),
         )
 
     def in_slow_motion(self, share: float) -> Self:
         """Limits within which every motion is one within these, only that time runs at a share of its speed."""
         rates = share * self.velocity, share**2 * self.acceleration, share**3 * self.jerk
-        return replace(self, velocity=rates[0], acceleration=rates[1], jerk=rates[2])
+        torques = tuple(it.in_slow_motion(share) for it in self.torques)
+        return replace(self, velocity=rates[0], acceleration=rates[1], jerk=rates[2], torques=torques)
 
     @property
     def build_up(self) -> float:
@@ -282,13 +287,21 @@ class Retimer:
             third = np.gradient(np.gradient(directions, lengths, axis=0), lengths, axis=0)
             with np.errstate(divide="ignore"):
                 highest = np.minimum(highest, np.cbrt((bend_share * self.bounds.jerk / np.abs(third)).min(axis=1)))
+        reserve = 1.0 if bend_share is None else RESERVE
         return fastest_profile(
             lengths,
             directions,
             velocity=self.bounds.velocity,
-            acceleration=(1.0 if bend_share is None else RESERVE) * self.bounds.acceleration,
+            acceleration=reserve * self.bounds.acceleration,
             highest=highest,
+            further=self._torques(piece.path.at(sigma), directions, lengths, reserve),
         )
+
+    def _torques(self, q: Array, directions: Array, lengths: Array, reserve: float) -> PathLoads | None:
+        """Limited torques along a stretch, up to a share of what gravity leaves of the limits; None without any."""
+        bent = np.gradient(directions, lengths, axis=0) if self.bounds.torques else directions
+        loads = [it.in_slow_motion(reserve**0.5).along(q, directions, bent) for it in self.bounds.torques]
+        return reduce(PathLoads.joined, loads) if loads else None
 
     def _steps(self, piece: PathStretch, motion: TimedRows, duration: float) -> int:
         """Steps that a motion of one stretch takes, made slower as a whole until every limit holds in its rows."""

@@ -1,7 +1,8 @@
 r"""Fastest speed along a path: the largest that velocities and accelerations of all joints allow.
 
 With the length p of the path, the squared speed :math:`x = \dot p^2` and :math:`u = \ddot p`, a joint has the
-acceleration :math:`q' u + q'' x`; over an interval in which u is constant, x is linear in p. Backwards from rest: the
+acceleration :math:`q' u + q'' x` and the torque :math:`a u + b x + c` (Bobrow, Dubowsky and Gibson 1985); over an
+interval in which u is constant, x is linear in p. Backwards from rest: the
 largest x from which some u keeps all limits at both ends of the interval and reaches what can be brought to rest
 behind it. Forwards from rest: the largest u that stays below. At every x the limits leave u between the highest of many
 lower lines and the lowest of many upper ones; the distance of the two is concave in x, so Newton's method from the
@@ -9,7 +10,7 @@ right finds the largest x at which it is not negative in a few steps, exactly.
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 
@@ -70,14 +71,42 @@ class SpeedProfile:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Lines:
-    """Bounds on u, by interval: ``-top - slope x <= u <= top - slope x``, shape (N - 1, L) each."""
+    """Bounds on u, by interval: ``-bottom - slope x <= u <= top - slope x``, shape (N - 1, L) each."""
 
     top: Array
+    bottom: Array
     slope: Array
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PathLoads:
+    """Loads along a path that are limited: ``-bottom <= along u + bent x <= top``, shape (N, m) each."""
+
+    along: Array  # by the acceleration of the path
+    bent: Array  # by its squared speed
+    top: Array  # positive
+    bottom: Array  # likewise
+
+    @classmethod
+    def in_shares(cls, along: Array, bent: Array) -> Self:
+        """Loads in shares of limits that are alike in both directions."""
+        ones = np.ones_like(along)
+        return cls(along=along, bent=bent, top=ones, bottom=ones)
+
+    def joined(self, other: Self) -> Self:
+        """These and others along the same path."""
+        fields = ("along", "bent", "top", "bottom")
+        return type(self)(**{it: np.concatenate([getattr(self, it), getattr(other, it)], axis=1) for it in fields})
+
+
 def fastest_profile(
-    lengths: Array, directions: Array, *, velocity: Array, acceleration: Array, highest: Array
+    lengths: Array,
+    directions: Array,
+    *,
+    velocity: Array,
+    acceleration: Array,
+    highest: Array,
+    further: PathLoads | None = None,
 ) -> SpeedProfile:
     """The fastest motion along a path from rest to rest.
 
@@ -87,14 +116,16 @@ def fastest_profile(
         velocity: Largest speeds of the joints, positive, shape (nq,).
         acceleration: Largest accelerations of the joints, positive; infinite for a joint without limit, shape (nq,).
         highest: Largest speeds of the path itself, shape (N,); infinite where there is no such limit.
+        further: Limited loads beside the accelerations, such as torques; None without any.
     """
     with np.errstate(divide="ignore"):
         allowed = np.minimum(highest, (velocity / np.abs(directions)).min(axis=1)) ** 2
     limited = np.isfinite(acceleration)
     step = np.diff(lengths)
-    if limited.any():
+    if limited.any() or further is not None:
         along = directions[:, limited] / acceleration[limited]
-        squared = largest_squares(step, along, np.gradient(along, lengths, axis=0), allowed)
+        loads = PathLoads.in_shares(along, np.gradient(along, lengths, axis=0))
+        squared = largest_squares(step, loads if further is None else loads.joined(further), allowed)
     else:
         squared = allowed.copy()
         squared[[0, -1]] = 0.0
@@ -103,31 +134,30 @@ def fastest_profile(
     return SpeedProfile(lengths=lengths, speeds=speeds, times=times)
 
 
-def largest_squares(step: Array, along: Array, bent: Array, allowed: Array) -> Array:
+def largest_squares(step: Array, loads: PathLoads, allowed: Array) -> Array:
     """Largest squared speeds along a path from rest to rest, shape (N,).
 
     Args:
         step: Lengths between neighbouring points of the path, positive, shape (N - 1,).
-        along: Derivatives of the joints by the length, in shares of their acceleration limits, shape (N, m).
-        bent: Their derivatives by the length, shape (N, m).
+        loads: Limited loads, those of a joint's acceleration in shares of its limit.
         allowed: Largest squared speeds for other reasons, shape (N,).
     """
-    lines = _lines(along, bent, step)
+    lines = _lines(loads, step)
     return _forward(lines, step, _backward(lines, step, allowed))
 
 
-def _lines(along: Array, bent: Array, step: Array) -> _Lines:
-    """Limits at both ends of every interval; at the later end the squared speed is ``x + 2 step u``.
-
-    Args:
-        along: Derivatives of the joints by the length, in shares of their acceleration limits, shape (N, m).
-        bent: Their derivatives by the length, shape (N, m).
-        step: Widths of the intervals, shape (N - 1,).
-    """
+def _lines(loads: PathLoads, step: Array) -> _Lines:
+    """Limits at both ends of every interval of some width; at the later end the squared speed is ``x + 2 step u``."""
+    along, bent = loads.along, loads.bent
     factor_u = np.concatenate([along[:-1], along[1:] + 2.0 * step[:, None] * bent[1:]], axis=1)
     factor_x = np.concatenate([bent[:-1], bent[1:]], axis=1)
-    size = np.maximum(np.abs(factor_u), LEAST)
-    return _Lines(top=1.0 / size, slope=np.where(factor_u < 0.0, -factor_x, factor_x) / size)
+    top, bottom = (np.concatenate([it[:-1], it[1:]], axis=1) for it in (loads.top, loads.bottom))
+    size, is_back = np.maximum(np.abs(factor_u), LEAST), factor_u < 0.0
+    return _Lines(
+        top=np.where(is_back, bottom, top) / size,
+        bottom=np.where(is_back, top, bottom) / size,
+        slope=np.where(is_back, -factor_x, factor_x) / size,
+    )
 
 
 def _backward(lines: _Lines, step: Array, allowed: Array) -> Array:
@@ -135,14 +165,14 @@ def _backward(lines: _Lines, step: Array, allowed: Array) -> Array:
     reach = np.empty_like(allowed)
     reach[-1] = 0.0
     for i in range(len(step) - 1, -1, -1):
-        top, slope, per_u = lines.top[i], lines.slope[i], 0.5 / step[i]
+        top, bottom, slope, per_u = lines.top[i], lines.bottom[i], lines.slope[i], 0.5 / step[i]
         target = reach[i + 1]
         x = min(allowed[i], target)  # a first step from the left never ends left of the largest
         for number in range(MOST_STEPS):
             bend = slope * x
-            up, low = int((top - bend).argmin()), int((top + bend).argmin())
+            up, low = int((top - bend).argmin()), int((bottom + bend).argmin())
             ceiling, ceiling_slope = top[up] - bend[up], -slope[up]
-            floor, floor_slope = -top[low] - bend[low], -slope[low]
+            floor, floor_slope = -bottom[low] - bend[low], -slope[low]
             if (target - x) * per_u < ceiling:
                 ceiling, ceiling_slope = (target - x) * per_u, -per_u
             if -x * per_u > floor:

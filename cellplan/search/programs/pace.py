@@ -15,7 +15,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.planning.timing.path_length import KINK, REST_SHARE
-from cellplan.planning.timing.speed_profile import largest_squares
+from cellplan.planning.timing.speed_profile import PathLoads, largest_squares
 from cellplan.search.programs.problem import Point, Problem
 
 END_NODES: Final = ((0, 1, 2), (-1, -2, -3))  # the ends of a stretch and the nodes beside them
@@ -88,7 +88,7 @@ class Pace:
                     part[:, limited] / problem.acceleration[limited]
                     for part in (directions, stretch.curvatures(directions, point.qdd))
                 )
-                initial = largest_squares(stretch.steps, along, bent, initial)
+                initial = largest_squares(stretch.steps, PathLoads.in_shares(along, bent), initial)
             initial[[0, -1]] = 0.0
             speeds = np.sqrt(initial)
             both = speeds[1:] + speeds[:-1]
