@@ -13,6 +13,7 @@ from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.report.floor_plan.pendants import pendant_lines
 from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanWall, length_text
+from cellplan.report.floor_plan.reactions import reaction_lines
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -148,14 +149,14 @@ def _draw_bases(space: "Modelspace", plan: FloorPlan, height: float) -> None:
 
 
 def _draw_frames(space: "Modelspace", plan: FloorPlan, *, at: Array, height: float) -> None:
-    """Axes and names of fixed frames of the part, and below the plan all frames to type into the pendants."""
+    """Axes and names of fixed frames of the part, and below the plan base reactions and all frames to type."""
     for place, frames in plan.fixed_frames.items():
         for X_W in frames.values():
             for share, toward in zip((3.0, 1.8), X_W[:2, :2].T, strict=True):
                 end = _point(np.array(place) + share * height * toward)
                 space.add_line(place, end, dxfattribs={"layer": str(Layer.PART)})
         _text(space, NAMES, ", ".join(frames), at=np.array(place) - [0.0, 1.6 * height], height=0.7 * height)
-    for number, words in enumerate(pendant_lines(plan.pendants)):
+    for number, words in enumerate([*reaction_lines(plan), *pendant_lines(plan.pendants)]):
         _text(space, NAMES, words, at=at - [0.0, 1.3 * height * number], height=0.7 * height)
 
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from cellplan.geometry.arrays import Array
+from cellplan.model.report.base_reaction import BaseReaction
 from cellplan.model.units import MM
 from cellplan.report.floor_plan.pendants import PlanPendant
 
@@ -69,6 +70,7 @@ class PlanRobot:
     reach: float | None  # largest distance of the flange from there; None where it is no circle: on a rail, a wall
     reach_outline: Array  # farthest places of the flange then, shape (K, 2); none where it is a circle
     swept: tuple[Array, ...]  # contours of what links and tools cover during the motion; none without a motion
+    reaction: BaseReaction | None = None  # what its base must hold; None where masses of links are not stated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -11,6 +11,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.report.floor_plan.pendants import pendant_lines
 from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanRobot, PlanWall, length_text
+from cellplan.report.floor_plan.reactions import SHORT, reaction_numbers, reaction_title, unstated_reactions
 from cellplan.report.record.common import shortened
 
 SVG_START: Final = '<svg class="plan-sheet"'
@@ -26,6 +27,7 @@ SCALES: Final = (1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 60, 75, 100, 125, 150, 200
 BARS: Final = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)  # [mm] lengths of a scale bar
 LONGEST_BAR: Final = 480  # units
 TEXT: Final = 34  # units between lines of the table
+REACTION_COLUMNS, REACTION_LETTERS = (370, 480, 590, 700), 48  # units: right ends of columns; letters in a line
 NAME_IN_LINE, NAME_ABOVE, NAME_IN_PLAN = 7, 32, 16  # letters of names beside and above their numbers, and in the plan
 FONT: Final = 'system-ui,"Segoe UI","Helvetica Neue",Arial,sans-serif'
 LIGHT: Final = f"""
@@ -257,7 +259,32 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
     if len(plan.robots) > len(shown):
         y += TEXT
         yield _text("key", left + 28, y, f"and {len(plan.robots) - len(shown)} more robots")
-    yield from _legend(plan, left, y + 90)
+    y += 90
+    for kind, words in _legend(plan):
+        yield f'<path class="{kind} n0k" d="M{left} {y - 6}h44v-16h-44z"/>'
+        yield _text("key", left + 64, y - 4, words)
+        y += TEXT
+    yield from _reactions(plan, numbers, left, y + 60)
+
+
+def _reactions(plan: FloorPlan, numbers: dict[str, int], left: float, top: float) -> Iterator[str]:
+    """Base reactions of the robots that have some, as many as there is space for, and who has none."""
+    known = [(robot, robot.reaction) for robot in plan.robots if robot.reaction is not None]
+    yield _text("head", left, top, reaction_title(plan))
+    for heading, right in zip(SHORT, REACTION_COLUMNS, strict=True):
+        yield from [_text("head right", left + right, top + TEXT, heading)] if known else []
+    y, bottom = top + TEXT * bool(known), UNIT * HEIGHT_MM - MARGIN - 2 * TEXT
+    count = max(0, min(len(known), int((bottom - y) / TEXT)))
+    for robot, reaction in known[:count]:
+        y += TEXT
+        yield f'<rect class="swatch n{numbers[robot.name]}" x="{left}" y="{y - 17}" width="16" height="16"/>'
+        yield _text("key", left + 28, y, shortened(robot.name, NAME_ABOVE // 2))
+        for text, right in zip(reaction_numbers(reaction), REACTION_COLUMNS, strict=True):
+            yield _text("key right", left + right, y, text)
+    more = f"and {len(known) - count} more in the report" if len(known) > count else ""
+    for words in filter(None, (more, unstated_reactions(plan))):
+        y += TEXT
+        yield _text("key", left, y, shortened(words, REACTION_LETTERS))
 
 
 def _lines(robot: PlanRobot) -> int:
@@ -279,8 +306,8 @@ def _directions(x: float, y: float) -> Iterator[str]:
     yield _text("key", x - 8, y - 104, "y")
 
 
-def _legend(plan: FloorPlan, left: float, top: float) -> Iterator[str]:
-    """What the lines mean."""
+def _legend(plan: FloorPlan) -> list[tuple[str, str]]:
+    """What the lines mean, by their kinds."""
     entries = [
         ("robots base", "base, stands still"),
         ("robots", "links and tools at the start"),
@@ -294,11 +321,7 @@ def _legend(plan: FloorPlan, left: float, top: float) -> Iterator[str]:
             ("swept", f"swept area, in squares of {plan.square:g} mm"),
             ("whole", "swept area of the whole cell"),
         ]
-    entries.append(("path", "paths of the tasks"))
-    for number, (kind, words) in enumerate(entries):
-        y = top + TEXT * number
-        yield f'<path class="{kind} n0k" d="M{left} {y - 6}h44v-16h-44z"/>'
-        yield _text("key", left + 64, y - 4, words)
+    return [*entries, ("path", "paths of the tasks")]
 
 
 def _wall(wall: PlanWall, sheet: Sheet) -> str:
