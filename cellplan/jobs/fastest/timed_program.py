@@ -24,6 +24,7 @@ from cellplan.runs.solve import certified, solve_motion
 from cellplan.scene.scene import Scene
 
 BINDS: Final = 0.99  # [-] share of a limit from which on it binds
+TORQUE: Final = "torque"
 TASK_LIMITS: Final = ("feed", "tolerance between rows")
 NEAR: Final = 1e-9  # [-] of a number of steps: rounding
 
@@ -47,7 +48,7 @@ class Binding:
     phase: str
     robot: str
     joint: str  # name of the joint; that of the task for its feed and its tolerance between rows
-    kind: str  # its limit: velocity, acceleration, jerk, tool speed, feed or tolerance between rows
+    kind: str  # its limit: velocity, acceleration, jerk, torque, tool speed, feed or tolerance between rows
     share: float  # what is reached of it, 0..1
     time_share: float  # share of the time of the phase that it asks for, 0..1
 
@@ -107,9 +108,7 @@ class TimedProgram:
         """Share of the time of the program in which the joints of one robot would allow their motion."""
         loads, columns = [0.0], self.solution.cell.columns(robot)
         for run in self.solution.runs:
-            limits, q = _rows(run)
-            shares = zip(limits.shares(run.schedule.times, q), ORDERS, strict=True)
-            loads += [float(share[columns].max(initial=0.0)) ** order for share, order in shares if run.phase.tasks]
+            loads += [float(_demanded(run)[1][:, columns].max(initial=0.0))] if run.phase.tasks else []
         return max(loads)
 
     def certified(self, progress: Progress, early: EarlyClearance | None = None) -> Self:
@@ -150,14 +149,21 @@ def _rows(run: Run) -> tuple[RowLimits, Array]:
     return row_limits(run.scene, run.schedule), np.concatenate([run.report.q[name] for name in names], axis=1)
 
 
+def _demanded(run: Run) -> tuple[Array, Array]:
+    """What of its limits each joint reaches, and what share of the time that asks for, by kind, shape (4, nq) each."""
+    limits, q = _rows(run)
+    shares, (torque, slower) = limits.shares(run.schedule.times, q), limits.torques(run.schedule.times, q)
+    required = [share**order for share, order in zip(shares, ORDERS, strict=True)]
+    return np.array([*shares, torque]), np.array([*required, slower])
+
+
 def _binding(run: Run, *, is_retimed: bool) -> Binding:
     """The limit that asks for most time in one phase; those of a task are limits of retimed programs."""
-    limits, q = _rows(run)
-    shares = limits.shares(run.schedule.times, q)
-    required = np.array([share**order for share, order in zip(shares, ORDERS, strict=True)])
+    limits, _ = _rows(run)
+    shares, required = _demanded(run)
     kind, column = np.unravel_index(int(required.argmax()), required.shape)
     robot, joint = joint_at(run.cell, int(column))
-    candidates = [(float(required.max()), robot, joint, KINDS[kind], float(shares[kind][column]))]
+    candidates = [(float(required.max()), robot, joint, (*KINDS, TORQUE)[kind], float(shares[kind][column]))]
     for name, feed in limits.feeds(run.motion.sigma, run.motion.times).items() if is_retimed else ():
         candidates.append((feed, run.cell.task(name).robot, name, "feed", feed))
     for errors in run.report.accuracy if is_retimed else ():

@@ -18,6 +18,7 @@ from cellplan.jobs.check import check
 from cellplan.jobs.view.cell_scene import standing
 from cellplan.jobs.view.describe import path_points
 from cellplan.jobs.view.run_scene import stored_series
+from cellplan.measures.base_reactions import standing_reactions
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.exported import Station
@@ -29,6 +30,7 @@ from cellplan.report.floor_plan.dxf import MARK, floor_plan_dxf, require_dxf
 from cellplan.report.floor_plan.pendants import PlanFrame, PlanPendant
 from cellplan.report.floor_plan.plan import FloorPlan
 from cellplan.report.floor_plan.sheet import SVG_START, floor_plan_svg
+from cellplan.report.record.sections.base_reactions import read_base_reactions
 from cellplan.runs.drawings.floor_plan import floor_plan, swept_state
 from cellplan.runs.gate.open_gate import read_run
 from cellplan.runs.gate.stored_cell import load_stored_cell
@@ -150,7 +152,8 @@ def _of_run(request: FloorPlanRequest) -> FloorPlan:
     motions = [{robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots} for _, q in read]
     start = {name: q[0] for name, q in motions[0].items()}
     whole = sum(float(times[-1]) for times, _ in read)
-    plan = floor_plan(cell, start, motions, _task_points(cell), state=swept_state(whole))
+    reactions, state = read_base_reactions(stored.record), swept_state(whole)
+    plan = floor_plan(cell, start, motions, _task_points(cell), state=state, reactions=reactions)
     return replace(plan, pendants=pendants)
 
 
@@ -160,7 +163,8 @@ def _of_cell(cell: Cell, progress: Progress) -> FloorPlan:
     except (InputError, NoSolutionError):
         started, state = cell, "Robots where the cell puts them, as no start was found"
     start = {robot.name: standing(robot) for robot in started.robots}
-    return floor_plan(started, start, [], _task_points(started), state=state)
+    reactions = {it.robot: it for it in standing_reactions(started, start)}
+    return floor_plan(started, start, [], _task_points(started), state=state, reactions=reactions)
 
 
 def _task_points(cell: Cell) -> dict[str, Array]:

@@ -12,6 +12,7 @@ from typing import Final, Self
 import numpy as np
 
 from cellplan.geometry.arrays import Array
+from cellplan.measures.accelerations import point_accelerations
 from cellplan.planning.timing.speed_profile import PathLoads
 
 SCARCE: Final = 1e-3  # [-] share of a limit: where gravity leaves less of it, no motion is slow enough
@@ -54,17 +55,26 @@ class TorqueLimits:
         top, bottom = (self._left(sign * still[:, limited] / largest) for sign in (1.0, -1.0))
         return PathLoads(along=along, bent=bent, top=top, bottom=bottom)
 
-    def slower(self, moving: Array, still: Array) -> float:
-        """By which factor a motion has to be slower for its torques to keep the limits, as far as that helps.
+    def in_rows(self, times: Array, q: Array) -> tuple[Array, Array]:
+        """What the rows of a motion from rest to rest reach, of each joint of the robot.
 
         Args:
-            moving: Torques of the motion in [N m] or [N], shape (N, n).
-            still: Those that hold the same configurations at rest, shape (N, n).
+            times: Times of the rows in [s], shape (N,).
+            q: Joint positions in [rad] or [m], shape (N, joints).
+
+        Returns:
+            The largest torques as shares of their limits, and by which factors the motion has to be slower for these,
+            as far as that helps, shape (n,) each.
         """
-        limited = np.isfinite(self.largest)
-        largest, change = self.largest[limited], (moving - still)[:, limited]
-        left = self._left(np.sign(change) * still[:, limited] / largest)
-        return float((np.abs(change) / (largest * left)).max(initial=0.0)) ** 0.5
+        q = q[:, self.columns]
+        zero, speeds = np.zeros_like(q), np.zeros((len(q) + 1, q.shape[1]))
+        speeds[1:-1] = np.diff(q, axis=0) / np.diff(times)[:, None]
+        still = self.torques(q, zero, zero)
+        moving = self.torques(q, 0.5 * (speeds[1:] + speeds[:-1]), point_accelerations(times, q))
+        change = moving - still
+        left = self._left(np.sign(change) * still / self.largest)
+        slower = np.sqrt((np.abs(change) / (self.largest * left)).max(axis=0))
+        return (np.abs(moving) / self.largest).max(axis=0), slower
 
     def _left(self, still: Array) -> Array:
         """What gravity leaves of limits for the motion, infinite where it leaves none; all in shares of the limits."""

@@ -36,7 +36,8 @@ def straight_line(start: Array, goal: Array) -> Array:
 def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:
     """Rows of the fastest straight move, shape (N, nq).
 
-    Where limits count that no closed form has, such as those of ``checks.tool_speed_mm_s``, the top speed is lowered.
+    Where limits count that no closed form has, such as those of ``checks.tool_speed_mm_s``, the top speed is lowered;
+    where torques do, the top acceleration is.
 
     Args:
         start: Stacked joint positions in [rad] or [m], shape (nq,).
@@ -52,11 +53,22 @@ def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:
         factor = retimer.slower(share, q)
         if factor <= 1.0:
             break
-        if factor > NEAR:
+        torque = _slower_by_torques(q, retimer)
+        if torque > 1.0 and torque >= factor:
+            second = widths[1] * torque**2
+            widths = [max(widths[0], second + widths[2]), second, widths[2]]
+            factor = sum(widths) / (count * retimer.step)
+        elif factor > NEAR:
             widths = [widths[0] * factor, *widths[1:]]
             factor = sum(widths) / (count * retimer.step)
         count = max(count + 1, int(np.ceil(count * factor)))
     return q
+
+
+def _slower_by_torques(q: Array, retimer: Retimer) -> float:
+    """By which factor rows of shape (N, nq) have to be slower for all torques to keep their limits."""
+    times = np.arange(len(q)) * retimer.step
+    return max((float(it.in_rows(times, q)[1].max()) for it in retimer.bounds.torques), default=0.0)
 
 
 def straight_steps(start: Array, goal: Array, bounds: JointLimitsInTime, step: float) -> Indices:

@@ -17,6 +17,7 @@ from cellplan.report.record.common import (
 from cellplan.report.record.figures import FiguresRecord, figures_record
 from cellplan.report.record.phases import PhaseRecord, clock_from, missing_moves, phases_record
 from cellplan.report.record.sections.accelerations import AccelerationsRecord, accelerations_record
+from cellplan.report.record.sections.base_reactions import BaseReactionRecord, base_reactions_record
 from cellplan.report.record.sections.clearance import (
     ClosestPair,
     Contact,
@@ -90,6 +91,9 @@ class HeadRecord(OriginRecord, BeginRecord):
     required_clearance_mm: Annotated[Number, "`checks.clearance_mm` of the cell"]
     accelerations: Annotated[AccelerationsRecord, "accelerations in the world"]
     not_in_program: Annotated[list[str], "moves that the program does not contain"]
+    base_reactions: Annotated[
+        dict[str, BaseReactionRecord], "by robot whose masses are stated: what its base must hold"
+    ]
     rests_on: Annotated[RestsOnRecord, "assumptions on which the values rest"]
     open_surfaces: Annotated[list[OpenSurfaceRecord], "bodies whose mesh is not closed"]
     remarks: Annotated[list[str], "what was not read of the files of robots"]
@@ -171,6 +175,7 @@ def run_record(phase: ReportedPhase, *, provenance: Provenance, planning: Planni
         "not_in_program": missing_moves(cell, {None: report.tasks}),
         **origin_record(cell, provenance),
         "caution": CAUTION,
+        "base_reactions": base_reactions_record(report.base_reactions),
         "rests_on": rests_on_record(cell, report.loads, report.standoffs),
         "closest_pairs": closest_pairs_record(report.clearance),
         "clearance_proof": clearance_proof_record(report.clearance),

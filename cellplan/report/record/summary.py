@@ -110,6 +110,7 @@ def _whole(
         "left_out": left_out_record(dict.fromkeys(entry for report in reports for entry in report.clearance.left_out)),
         "checks": [{"phase": name, **check} for name, record in records.items() for check in record["checks"]],
         "not_in_program": missing_moves(cell, {report.phase: report.tasks for report in reports}),
+        "base_reactions": worst["base_reactions"],
         "rests_on": {**rests_on, "payload": worst["payload"]},
         **origin_record(cell, provenance),
         "caution": CAUTION,
@@ -128,6 +129,7 @@ def _merged(record: RunRecord, cell: Cell) -> Record:
         "clearance": record["clearance"],
         "accelerations": record["accelerations"],
         "payload": record["rests_on"]["payload"],
+        "base_reactions": record["base_reactions"],
     }
 
 
@@ -182,6 +184,9 @@ FIGURES: Final = (
     Figure("static_moment_nm", max, "static_moment_at_s"),
     Figure("moment_nm", max, "moment_at_s"),
     Figure("inertia_kg_m2", max, "inertia_at_s"),
+    *(Figure(f"{key}_n", max, f"{key}_at_s") for key in ("vertical", "horizontal")),
+    *(Figure(f"{key}_nm", max, f"{key}_at_s") for key in ("tilting", "turning", "tilting_at_rest")),
+    Figure("weight_n", max, ""),
 )
 
 

@@ -1,7 +1,9 @@
 """The floor plan of a cell: what stands where, what moves how far, and how far each robot reaches."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -13,6 +15,7 @@ from cellplan.geometry.shapes import HalfSpace, Solid
 from cellplan.geometry.transforms import transform_points
 from cellplan.model.cell.cell import Cell, Robot, RobotRows
 from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.base_reaction import BaseReaction
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.task.task import Frame
 from cellplan.model.units import DEG, MM
@@ -27,6 +30,7 @@ TRAVEL: Final = 0.12  # [m] between the rows that a swept area is made of, at a 
 MOST_ROWS: Final = 240  # [-] of them
 REACH_ROUNDS: Final = 5  # [-] enough for a drawing
 PATH_POINTS: Final = 121  # [-]
+NO_REACTIONS: Final[Mapping[str, BaseReaction]] = MappingProxyType({})
 LEVEL: Final = 1e-6  # [-] component of a normal that is zero
 
 LAYERS: Final = {Kind.PART: Layer.PART, Kind.OBSTACLE: Layer.SURROUNDINGS}  # others belong to the robots
@@ -35,7 +39,13 @@ TaskPoints = Mapping[str, Array]
 
 
 def floor_plan(
-    cell: Cell, start: Mapping[str, Array], motions: Sequence[Mapping[str, Array]], paths: TaskPoints, *, state: str
+    cell: Cell,
+    start: Mapping[str, Array],
+    motions: Sequence[Mapping[str, Array]],
+    paths: TaskPoints,
+    *,
+    state: str,
+    reactions: Mapping[str, BaseReaction] = NO_REACTIONS,
 ) -> FloorPlan:
     """The floor plan of a cell.
 
@@ -44,6 +54,7 @@ def floor_plan(
         motions: Joint positions of which the swept area is shown, shape (N, n) each; none for a cell that stands.
         paths: Points of the path of each task in [m], shape (N, 3), on the part or in the world as the task says.
         state: What is shown, in words.
+        reactions: What the bases must hold meanwhile, by robot, as far as it is known.
     """
     chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
     bodies = [body for body in scene_bodies(cell) if not isinstance(body.shape, HalfSpace)]
@@ -54,7 +65,7 @@ def floor_plan(
         cell=cell.name,
         state=state,
         robots=tuple(
-            _robot(robot, colour, squares)
+            replace(_robot(robot, colour, squares), reaction=reactions.get(robot.name))
             for robot, colour in zip(cell.robots, robot_colours(cell).values(), strict=True)
         ),
         outlines=tuple(

@@ -10,6 +10,7 @@ from cellplan.geometry.shapes import HalfSpace, support
 from cellplan.geometry.transforms import transform_points
 from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.base_reaction import largest_reactions
 from cellplan.model.report.report import Report
 from cellplan.model.report.verified_run import VerifiedMotion
 from cellplan.model.task.task import Frame
@@ -271,4 +272,5 @@ def _floor_plan(cell: Cell, phases: Sequence[DepictedPhase]) -> str:
     paths = {name: points for phase in phases for name, points in schedule_paths(phase.schedule).items()}
     whole = sum(phase.report.cycle_time for phase in phases)
     start = {name: q[0] for name, q in motions[0].items()}
-    return floor_plan_svg(floor_plan(cell, start, motions, paths, state=swept_state(whole)))
+    reactions = largest_reactions(it for phase in phases for it in phase.report.base_reactions)
+    return floor_plan_svg(floor_plan(cell, start, motions, paths, state=swept_state(whole), reactions=reactions))

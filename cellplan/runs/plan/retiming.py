@@ -23,6 +23,7 @@ from cellplan.planning.timing.fixed_rates import FixedRate
 from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.runs.plan.program import ProgramClock
+from cellplan.runs.plan.torque_limits import torque_limits
 from cellplan.scene.scene import Scene
 
 POINTS: Final = 2000  # [-] nominal times at which the bend of the joint path is taken
@@ -232,8 +233,15 @@ class RowLimits:
         feed = max([self._waits(sigma), *self.feeds(sigma, times).values()])
         tools = float(self._tool_moves(q[:-1], q[1:]).max()) / self.step
         points = max((float(it.travel(q).max()) / (self.step * it.limit) for it in self.bounds.points), default=0.0)
-        part = self._part_share(times, q) ** 0.5
-        return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, tools, points, part)
+        part, torque = self._part_share(times, q) ** 0.5, float(self.torques(times, q)[1].max(initial=0.0))
+        return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, tools, points, part, torque)
+
+    def torques(self, times: Array, q: Array) -> tuple[Array, Array]:
+        """Largest torque of each joint as a share of its limit, and how much slower it asks for, shape (nq,) each."""
+        shares, factors = np.zeros((2, q.shape[1]))
+        for it in self.bounds.torques:
+            shares[it.columns], factors[it.columns] = it.in_rows(times, q)
+        return shares, factors
 
     def feeds(self, sigma: Array, times: Array) -> dict[str, float]:
         """Largest speed of each tool along its path between rows, as a share of its feed, by task with a feed.
@@ -296,7 +304,8 @@ class RowLimits:
 
 def row_limits(scene: Scene, schedule: Schedule) -> RowLimits:
     """The limits in the rows of one phase; its schedule names the tasks."""
-    return RowLimits(scene, schedule.paths, joint_bounds(scene.cell), scene.cell.motion.step)
+    bounds = replace(joint_bounds(scene.cell), torques=torque_limits(scene))
+    return RowLimits(scene, schedule.paths, bounds, scene.cell.motion.step)
 
 
 def transfer_retimer(scene: Scene) -> Retimer:
@@ -305,7 +314,7 @@ def transfer_retimer(scene: Scene) -> Retimer:
     The limits of ``program.transfer`` are among them.
     """
     cap = scene.cell.program.transfer
-    bounds = joint_bounds(scene.cell).in_slow_motion(cap.share)
+    bounds = replace(joint_bounds(scene.cell), torques=torque_limits(scene)).in_slow_motion(cap.share)
     bounds = replace(bounds, points=point_speeds(scene, si_or_none(cap.tcp_mm_s)))
     limits = RowLimits(scene, (), bounds, scene.cell.motion.step)
     return Retimer(bounds=limits.bounds, step=limits.step, feed_share=limits.feed_share, slower=limits.slower)

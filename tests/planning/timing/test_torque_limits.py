@@ -44,9 +44,7 @@ def retimed(
     path = path_of(q)
 
     def slower(sigma: Array, q: Array) -> float:
-        padded = np.concatenate([q[:1], q, q[-1:]])
-        qd, qdd = (padded[2:] - padded[:-2]) / (2.0 * step), np.diff(padded, 2, axis=0) / step**2
-        return limits.slower(limits.torques(q, qd, qdd), limits.torques(q, 0.0 * q, 0.0 * q))
+        return float(limits.in_rows(np.arange(len(q)) * step, q)[1].max())
 
     motion = Retimer(
         bounds=replace(bounds, torques=(limits,)), step=step, feed_share=lambda at: np.zeros(len(at)), slower=slower
@@ -123,11 +121,13 @@ def test_in_slow_motion_gravity_stays_and_the_motion_takes_up_less() -> None:
     np.testing.assert_allclose(full.bottom * 45.0, 45.0 + MASS * G)
 
 
-def test_where_a_joint_cannot_hold_its_load_at_rest_no_slower_motion_is_sought() -> None:
-    limits = limits_of(lift, MASS * G - 1.0)
-    still = np.full((1, 1), MASS * G)
-    assert limits.slower(still + 5.0, still) == 0.0
-    assert limits.slower(still - 50.0, still) == pytest.approx(np.sqrt(50.0 / (2.0 * MASS * G - 1.0)))
+def test_where_a_joint_cannot_hold_its_load_at_rest_only_pushes_back_ask_for_time() -> None:
+    """The limit is 1 N below the weight; the joint without a limit asks for nothing."""
+    limits, step = limits_of(lift, MASS * G - 1.0, np.inf), 0.01
+    rows = np.array([0.0, 0.0, -10.0, -20.0, -20.0])[:, None] * step**2  # 10 m/s^2 downwards, then as much upwards
+    shares, factors = limits.in_rows(step * np.arange(5), np.tile(rows, (1, 2)))
+    np.testing.assert_allclose(shares, [MASS * (G + 10.0) / (MASS * G - 1.0), 0.0])
+    np.testing.assert_allclose(factors, [np.sqrt(10.0 * MASS / (2.0 * MASS * G - 1.0)), 0.0])
 
 
 def test_limits_follow_their_joints_into_a_part_of_the_configurations() -> None:

@@ -1,10 +1,12 @@
 """Base reactions in the record of a run."""
 
 from collections.abc import Iterable
-from typing import Annotated, TypedDict
+from typing import Annotated, Final, TypedDict
 
-from cellplan.model.report.base_reaction import BaseReaction
-from cellplan.report.record.common import Number, number
+from cellplan.model.report.base_reaction import BaseReaction, PeakLoad
+from cellplan.report.record.common import Number, Record, number
+
+PEAKS: Final = {"vertical": "n", "horizontal": "n", "tilting": "nm", "turning": "nm", "tilting_at_rest": "nm"}
 
 
 class BaseReactionRecord(TypedDict):
@@ -42,3 +44,12 @@ def _reaction_record(reaction: BaseReaction) -> BaseReactionRecord:
         "tilting_at_rest_nm": number(reaction.tilting_at_rest.size),
         "tilting_at_rest_at_s": number(reaction.tilting_at_rest.at_s),
     }
+
+
+def read_base_reactions(record: Record) -> dict[str, BaseReaction]:
+    """Base reactions by robot, of a record that may have none."""
+    known = {}
+    for robot, entry in record.get("base_reactions", {}).items():
+        peaks = {name: PeakLoad(entry[f"{name}_{unit}"], entry[f"{name}_at_s"]) for name, unit in PEAKS.items()}
+        known[robot] = BaseReaction(robot=robot, weight=entry["weight_n"], **peaks)
+    return known
