@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
+from cellplan.model.motion.joint_path import JointPath
 from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
 
 NEAR: Final = 1.02  # [-] factor of time up to which the law is slowed as a whole; above, its top speed is lowered
@@ -37,7 +38,7 @@ def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:
     """Rows of the fastest straight move, shape (N, nq).
 
     Where limits count that no closed form has, such as those of ``checks.tool_speed_mm_s``, the top speed is lowered;
-    where torques do, the top acceleration is.
+    where torques do, the law is that of any other path.
 
     Args:
         start: Stacked joint positions in [rad] or [m], shape (nq,).
@@ -53,22 +54,28 @@ def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:
         factor = retimer.slower(share, q)
         if factor <= 1.0:
             break
-        torque = _slower_by_torques(q, retimer)
-        if torque > 1.0 and torque >= factor:
-            second = widths[1] * torque**2
-            widths = [max(widths[0], second + widths[2]), second, widths[2]]
-            factor = sum(widths) / (count * retimer.step)
-        elif factor > NEAR:
+        if _exceeds_torques(q, retimer):
+            return _rows_by_torques(start, goal, retimer)
+        if factor > NEAR:
             widths = [widths[0] * factor, *widths[1:]]
             factor = sum(widths) / (count * retimer.step)
         count = max(count + 1, int(np.ceil(count * factor)))
     return q
 
 
-def _slower_by_torques(q: Array, retimer: Retimer) -> float:
-    """By which factor rows of shape (N, nq) have to be slower for all torques to keep their limits."""
+def _exceeds_torques(q: Array, retimer: Retimer) -> bool:
+    """Whether a torque exceeds its limit in rows of shape (N, nq), and slower ones would help."""
     times = np.arange(len(q)) * retimer.step
-    return max((float(it.in_rows(times, q)[1].max()) for it in retimer.bounds.torques), default=0.0)
+    return any(it.in_rows(times, q)[1].max() > 1.0 for it in retimer.bounds.torques)
+
+
+def _rows_by_torques(start: Array, goal: Array, retimer: Retimer) -> Array:
+    """Rows of a straight move by the fastest speed that torques allow at its places."""
+    line = JointPath.through(np.array([0.0, 1.0]), np.stack([start, goal]))
+    at = retimer.fastest(line).sigma
+    q: Array = start + (at * at * (3.0 - 2.0 * at))[:, None] * (goal - start)
+    q[-1] = goal
+    return q
 
 
 def straight_steps(start: Array, goal: Array, bounds: JointLimitsInTime, step: float) -> Indices:

@@ -228,13 +228,25 @@ class RowLimits:
             sigma: Nominal times of the rows in [s], shape (N,).
             q: Stacked joint positions in [rad] or [m], shape (N, nq).
         """
+        return max(self._slower_by_rates(sigma, q), self._slower_by_torques(q))
+
+    def slower_at_first(self, sigma: Array, q: Array) -> float:
+        """The same, but torques, which take longest to work out, count once all other limits hold."""
+        factor = self._slower_by_rates(sigma, q)
+        return factor if factor > 1.0 else max(factor, self._slower_by_torques(q))
+
+    def _slower_by_torques(self, q: Array) -> float:
+        return float(self.torques(np.arange(len(q)) * self.step, q)[1].max(initial=0.0))
+
+    def _slower_by_rates(self, sigma: Array, q: Array) -> float:
+        """By which factor rows have to be slower for all limits but those of torques."""
         times = np.round(np.arange(len(q)) * self.step, TIME_DECIMALS)
         velocity, acceleration, jerk = (float(shares.max()) for shares in self.shares(times, q))
         feed = max([self._waits(sigma), *self.feeds(sigma, times).values()])
         tools = float(self._tool_moves(q[:-1], q[1:]).max()) / self.step
         points = max((float(it.travel(q).max()) / (self.step * it.limit) for it in self.bounds.points), default=0.0)
-        part, torque = self._part_share(times, q) ** 0.5, float(self.torques(times, q)[1].max(initial=0.0))
-        return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, tools, points, part, torque)
+        part = self._part_share(times, q) ** 0.5
+        return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, tools, points, part)
 
     def torques(self, times: Array, q: Array) -> tuple[Array, Array]:
         """Largest torque of each joint as a share of its limit, and how much slower it asks for, shape (nq,) each."""
@@ -317,7 +329,7 @@ def transfer_retimer(scene: Scene) -> Retimer:
     bounds = replace(joint_bounds(scene.cell), torques=torque_limits(scene)).in_slow_motion(cap.share)
     bounds = replace(bounds, points=point_speeds(scene, si_or_none(cap.tcp_mm_s)))
     limits = RowLimits(scene, (), bounds, scene.cell.motion.step)
-    return Retimer(bounds=limits.bounds, step=limits.step, feed_share=limits.feed_share, slower=limits.slower)
+    return Retimer(bounds=limits.bounds, step=limits.step, feed_share=limits.feed_share, slower=limits.slower_at_first)
 
 
 def fixed_rates(paths: Sequence[ClockedPath]) -> tuple[FixedRate, ...]:
@@ -344,7 +356,7 @@ def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath, cycle: flo
         bounds=limits.bounds,
         step=motion.step,
         feed_share=limits.feed_share,
-        slower=limits.slower,
+        slower=limits.slower_at_first,
         fixed_rates=fixed_rates(schedule.paths),
         errors=errors,
     )
