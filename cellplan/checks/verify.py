@@ -32,6 +32,7 @@ from cellplan.checks.tools.tracking import check_accuracy, check_closure
 from cellplan.checks.tools.weld_position import check_arcs, check_weld_positions
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
+from cellplan.measures.base_reactions import base_reactions
 from cellplan.measures.joint_use import joint_uses
 from cellplan.measures.standoff import standoffs
 from cellplan.measures.tool_depth import tool_depths
@@ -132,6 +133,7 @@ def verify_motion(
         standoffs=tips,
         accelerations=accelerations,
         loads=loads,
+        base_reactions=tuple(base_reactions(cell, scene.chains, schedule.times, q)),
         greatest_feeds=greatest_feeds(scene, schedule, q, accuracy),
     )
 

@@ -1,20 +1,46 @@
-"""Base reactions of a motion, from the wrenches that hold the foot of a robot."""
+"""Base reactions of a motion, and of robots that stand still."""
+
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array, first_peak
+from cellplan.measures.accelerations import row_motion
+from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.report.base_reaction import BaseReaction, PeakLoad
+from cellplan.scene.dynamics.loads import carried_masses, has_known_masses
+from cellplan.scene.dynamics.newton_euler import JointRows, joint_torques
+from cellplan.scene.kinematics.screw_chain import Chains, ScrewChain
 
 
-def base_reaction(robot: str, times: Array, moving_W: Array, still_W: Array) -> BaseReaction:
-    """Largest forces and moments that what a robot stands on must hold.
+def base_reactions(cell: Cell, chains: Chains, times: Array, q: RobotRows) -> Iterator[BaseReaction]:
+    """What the bases of the robots with known masses must hold.
 
     Args:
-        robot: Its name.
+        cell: The cell.
+        chains: Its robots.
         times: Times of the rows in [s], shape (N,).
-        moving_W: Force in [N] and moment in [N m] about the origin of the base that hold its foot, in W, shape (N, 6).
-        still_W: Those that hold it at rest in the same configurations, shape (N, 6).
+        q: Positions in [rad] or [m], shape (N, n), by robot.
     """
+    for robot in cell.robots:
+        if has_known_masses(cell, robot):
+            chain, carried, at = chains[robot.name], carried_masses(cell, robot), q[robot.name]
+            motion, zero = row_motion(times, at), np.zeros_like(at)
+            moving, still = (
+                joint_torques(chain, robot.model, JointRows(q=at, qd=qd, qdd=qdd), carried=carried).base_W
+                for qd, qdd in (motion, (zero, zero))
+            )
+            yield _largest(robot.name, times, moving, still)
+
+
+def standing_reactions(cell: Cell, q: Mapping[str, Array]) -> Iterator[BaseReaction]:
+    """What they must hold while all stand still, q in [rad] or [m] of shape (n,) by robot."""
+    chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
+    return base_reactions(cell, chains, np.arange(2.0), {name: np.tile(at, (2, 1)) for name, at in q.items()})
+
+
+def _largest(robot: str, times: Array, moving_W: Array, still_W: Array) -> BaseReaction:
+    """The largest of the wrenches that hold a foot, in motion and at rest, shape (N, 6) each."""
     sizes = {
         "vertical": np.abs(moving_W[:, 2]),
         "horizontal": np.linalg.norm(moving_W[:, :2], axis=1),
@@ -22,22 +48,5 @@ def base_reaction(robot: str, times: Array, moving_W: Array, still_W: Array) -> 
         "turning": np.abs(moving_W[:, 5]),
         "tilting_at_rest": np.linalg.norm(still_W[:, 3:5], axis=1),
     }
-    peaks = {
-        key: PeakLoad(float(size.max()), float(times[first_peak(size)])) for key, size in sizes.items()
-    }
+    peaks = {key: PeakLoad(float(size.max()), float(times[first_peak(size)])) for key, size in sizes.items()}
     return BaseReaction(robot=robot, weight=float(np.abs(still_W[:, 2]).max()), **peaks)
-
-
-def standing_reactions(cell: Cell, q: Mapping[str, Array]) -> Iterator[BaseReaction]:
-    """What the bases of robots with known masses must hold while all stand still.
-
-    Args:
-        cell: The cell.
-        q: Joint positions by robot in [rad] or [m], shape (n,) each.
-    """
-    for robot in cell.robots:
-        if robot.model.inertias is not None:
-            at, zero = np.tile(q[robot.name], (2, 1)), np.zeros((2, len(q[robot.name])))
-            rows = JointRows(q=at, qd=zero, qdd=zero)
-            held = joint_torques(ScrewChain(robot), robot.model, rows, carried=carried_masses(cell, robot))
-            yield base_reaction(robot.name, np.arange(2.0), held.base_W, held.base_W)

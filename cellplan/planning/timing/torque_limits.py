@@ -12,7 +12,7 @@ from typing import Final, Self
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.measures.accelerations import point_accelerations
+from cellplan.measures.accelerations import row_motion
 from cellplan.planning.timing.speed_profile import PathLoads
 
 SCARCE: Final = 1e-3  # [-] share of a limit: where gravity leaves less of it, no motion is slow enough
@@ -67,10 +67,7 @@ class TorqueLimits:
             as far as that helps, shape (n,) each.
         """
         q = q[:, self.columns]
-        zero, speeds = np.zeros_like(q), np.zeros((len(q) + 1, q.shape[1]))
-        speeds[1:-1] = np.diff(q, axis=0) / np.diff(times)[:, None]
-        still = self.torques(q, zero, zero)
-        moving = self.torques(q, 0.5 * (speeds[1:] + speeds[:-1]), point_accelerations(times, q))
+        still, moving = self.torques(q, np.zeros_like(q), np.zeros_like(q)), self.torques(q, *row_motion(times, q))
         change = moving - still
         left = self._left(np.sign(change) * still / self.largest)
         slower = np.sqrt((np.abs(change) / (self.largest * left)).max(axis=0))

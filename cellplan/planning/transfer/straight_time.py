@@ -65,7 +65,7 @@ def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:
 
 def _exceeds_torques(q: Array, retimer: Retimer) -> bool:
     """Whether a torque exceeds its limit in rows of shape (N, nq), and slower ones would help."""
-    times = np.arange(len(q)) * retimer.step
+    times = np.linspace(0.0, (len(q) - 1) * retimer.step, len(q))
     return any(it.in_rows(times, q)[1].max() > 1.0 for it in retimer.bounds.torques)
 
 

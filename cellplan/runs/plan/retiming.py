@@ -236,7 +236,8 @@ class RowLimits:
         return factor if factor > 1.0 else max(factor, self._slower_by_torques(q))
 
     def _slower_by_torques(self, q: Array) -> float:
-        return float(self.torques(np.arange(len(q)) * self.step, q)[1].max(initial=0.0))
+        times = np.round(np.arange(len(q)) * self.step, TIME_DECIMALS)
+        return float(self.torques(times, q)[1].max(initial=0.0))
 
     def _slower_by_rates(self, sigma: Array, q: Array) -> float:
         """By which factor rows have to be slower for all limits but those of torques."""

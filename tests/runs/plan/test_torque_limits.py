@@ -75,6 +75,7 @@ TORQUES = {"A": 8.0, "B": 4.0, "C": 1.0}  # [N m]
 def pair(timing: object) -> Cell:
     """Two planar arms of rods, retimed."""
     values = {
+        "part.mass_kg": 1e-6,
         "motion.timing": timing,
         "motion.step_s": STEP,
         "motion.duration_s": 4,
@@ -83,6 +84,7 @@ def pair(timing: object) -> Cell:
         "tasks.circle.tolerance.between_rows_deg": 10,
     }
     for robot in ("left", "right"):
+        values[f"robots.{robot}.tool.mass_kg"] = 1e-6
         values[f"robots.{robot}.inertias"] = {"links": RODS, "source": "rods"}
         values[f"robots.{robot}.limits"] = {joint: {"torque_nm": torque} for joint, torque in TORQUES.items()}
     return load_cell(CELL).with_values(values)
