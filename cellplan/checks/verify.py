@@ -108,9 +108,8 @@ def verify_motion(
     checks += [*joint_checks, *check_accelerations(cell, accelerations), *check_tool_speeds(cell, speeds)]
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
-    arcs, welds = check_arcs(cell, schedule, scene.chains, q), check_weld_positions(schedule, scene.chains, q, X_WP)
     checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
-    checks += [*check_payload(loads), *welds, *arcs, *check_seam_distances(cell, schedule, scene.chains, q, X_WP)]
+    checks += [*check_payload(loads), *_seam_checks(scene, schedule, q, X_WP)]
     checks += check_transfer_speeds(scene, schedule, uses, q) if moving else []
     return Report(
         cell=cell.name,
@@ -136,6 +135,13 @@ def verify_motion(
         base_reactions=tuple(base_reactions(cell, scene.chains, schedule.times, q)),
         greatest_feeds=greatest_feeds(scene, schedule, q, accuracy),
     )
+
+
+def _seam_checks(scene: Scene, schedule: Schedule, q: RobotRows, X_WP: Array) -> list[Check]:
+    """Positions of welds, arcs of tools, and distances from seams and walls."""
+    cell, chains = scene.cell, scene.chains
+    welds, arcs = check_weld_positions(schedule, chains, q, X_WP), check_arcs(cell, schedule, chains, q)
+    return [*welds, *arcs, *check_seam_distances(cell, schedule, chains, q, X_WP)]
 
 
 def with_clearance(

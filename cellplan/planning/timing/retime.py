@@ -68,8 +68,8 @@ class JointLimitsInTime:
     def of(self, columns: slice) -> Self:
         """Those of some joints."""
 
-        def is_among(own: slice) -> bool:
-            return columns.start <= own.start and own.stop <= columns.stop
+        def is_among(others: slice) -> bool:
+            return columns.start <= others.start and others.stop <= columns.stop
 
         return replace(
             self,

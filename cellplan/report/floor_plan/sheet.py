@@ -294,7 +294,7 @@ def _lines(robot: PlanRobot) -> int:
 
 def _fitting(robots: Sequence[PlanRobot], top: float) -> Sequence[PlanRobot]:
     """The robots that the table has room for."""
-    count = int((UNIT * HEIGHT_MM - MARGIN - top - 330) / TEXT) - 1
+    count = int((UNIT * HEIGHT_MM - MARGIN - top - 530) / TEXT) - 1
     taken = np.cumsum([_lines(robot) for robot in robots])
     return robots[: int(np.searchsorted(taken, count, side="right"))]
 

@@ -64,10 +64,10 @@ def test_a_mass_without_gravity_takes_the_time_of_a_double_integrator() -> None:
     assert 0.002 * motion.steps == pytest.approx(2.0 * np.sqrt(2.0 * MASS / 6.0), abs=0.004)
 
 
-@pytest.mark.parametrize("way", [along(0.0, 1.0), along(1.0, 0.0)], ids=["up", "down"])
-def test_a_lifted_mass_is_pushed_with_what_gravity_leaves(way: Callable[[Array], Array]) -> None:
+@pytest.mark.parametrize("course", [along(0.0, 1.0), along(1.0, 0.0)], ids=["up", "down"])
+def test_a_lifted_mass_is_pushed_with_what_gravity_leaves(course: Callable[[Array], Array]) -> None:
     force = 45.0
-    motion, _ = retimed(limits_of(lift, force), way, step=0.002, bounds=bounds_of(100.0, np.inf))
+    motion, _ = retimed(limits_of(lift, force), course, step=0.002, bounds=bounds_of(100.0, np.inf))
     up, down = force / MASS - G, force / MASS + G
     assert 0.002 * motion.steps == pytest.approx(np.sqrt(2.0 * (1.0 / up + 1.0 / down)), abs=0.004)
 

@@ -16,6 +16,7 @@ from cellplan import load_cell
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Obstacle
+from cellplan.model.report.base_reaction import BaseReaction, PeakLoad
 from cellplan.report.floor_plan.dxf import floor_plan_dxf
 from cellplan.report.floor_plan.pendants import PlanFrame, PlanPendant
 from cellplan.report.floor_plan.plan import FloorPlan
@@ -212,3 +213,55 @@ def test_the_drawing_has_the_frames_to_type_as_texts(plan: FloorPlan) -> None:
     ]
     lines = document.modelspace().query("LINE[layer=='part']")
     assert {(round(line.dxf.start.x), round(line.dxf.start.y)) for line in lines} == {(500, 250), (0, 250)}
+
+
+REACTIONS = ("Fv N", "Fh N", "Mk Nm", "Mr Nm")
+
+
+def lines_of(plan: FloorPlan) -> list[tuple[float, str]]:
+    """Texts of the sheet with their heights from its upper edge."""
+    found = re.findall(r'<text class="[^"]*" x="[^"]*" y="([^"]*)"[^>]*>([^<]*)</text>', floor_plan_svg(plan))
+    return [(float(y), text) for y, text in found]
+
+
+def with_reactions(plan: FloorPlan, *names: str) -> FloorPlan:
+    """The plan with base reactions of some robots."""
+    reaction = BaseReaction(
+        robot="",
+        weight=2000.0,
+        vertical=PeakLoad(2345.6, 0.1),
+        horizontal=PeakLoad(678.9, 0.2),
+        tilting=PeakLoad(1234.5, 0.3),
+        turning=PeakLoad(432.1, 0.4),
+        tilting_at_rest=PeakLoad(900.0, 0.5),
+    )
+    robots = tuple(replace(it, reaction=reaction if it.name in names else None) for it in plan.robots)
+    return replace(plan, robots=robots)
+
+
+def test_base_reactions_stand_below_the_legend_and_robots_without_masses_in_one_line(plan: FloorPlan) -> None:
+    texts = [text for _, text in lines_of(with_reactions(plan, "kuka"))]
+    at = texts.index("Base reactions in the motion")
+    unknown = [robot.name for robot in plan.robots if robot.name != "kuka"]
+    assert texts[at + 1 : at + 11] == [
+        *REACTIONS, "kuka", "2346", "679", "1234", "432", f"not stated: masses of {', '.join(unknown)}"
+    ]  # fmt: skip
+
+
+def test_without_any_masses_the_plan_says_so_in_one_line(plan: FloorPlan) -> None:
+    texts = [text for _, text in lines_of(plan)]
+    assert not set(REACTIONS) & set(texts)
+    assert sum("not stated: masses of" in text for text in texts) == 1
+
+
+def test_base_reactions_that_do_not_fit_on_the_paper_are_counted(plan: FloorPlan) -> None:
+    first = with_reactions(plan, plan.robots[0].name).robots[0]
+    lines = lines_of(replace(plan, robots=(*plan.robots, *(replace(first, name=f"r{k}") for k in range(60)))))
+    assert max(y for y, _ in lines) <= UNIT * 210
+    assert any(re.fullmatch(r"and \d+ more in the report", text) for _, text in lines)
+
+
+def test_the_drawing_has_the_base_reactions_as_texts(plan: FloorPlan) -> None:
+    texts = [text.dxf.text for text in drawing(with_reactions(plan, "kuka")).modelspace().query("TEXT")]
+    assert "  kuka: vertical 2346 N, horizontal 679 N, tilting 1234 Nm, turning 432 Nm" in texts
+    assert any(text.startswith("  not stated: masses of") for text in texts)
