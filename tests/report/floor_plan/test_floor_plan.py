@@ -220,8 +220,8 @@ REACTIONS = ("Fv N", "Fh N", "Mk Nm", "Mr Nm")
 
 def lines_of(plan: FloorPlan) -> list[tuple[float, str]]:
     """Texts of the sheet with their heights from its upper edge."""
-    found = re.findall(r'<text class="[^"]*" x="[^"]*" y="([^"]*)"[^>]*>([^<]*)</text>', floor_plan_svg(plan))
-    return [(float(y), text) for y, text in found]
+    lines = re.findall(r'<text class="[^"]*" x="[^"]*" y="([^"]*)"[^>]*>([^<]*)</text>', floor_plan_svg(plan))
+    return [(float(y), text) for y, text in lines]
 
 
 def with_reactions(plan: FloorPlan, *names: str) -> FloorPlan:
