@@ -9,14 +9,15 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.transforms import Array, inverse, rotation_exp
-from cellplan.measures.tool_errors import part_poses, pose_accuracy
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array, inverse, rotation_exp, transform_points
+from cellplan.measures.tool_errors import part_poses, pose_accuracy, relative_to_task_frame
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.rehearsal import PathFigures, PoseFigures, RunRehearsal
 from cellplan.model.report.report import Check, TaskAccuracy
-from cellplan.model.settings.cell_errors import MeasurementEntry
-from cellplan.model.task.task import Frame
+from cellplan.model.settings.cell_errors import CameraEntry, CameraModelEntry, MeasurementEntry
+from cellplan.model.task.task import Frame, Task
 from cellplan.model.units import DEGREES, MILLIMETRES
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
@@ -34,25 +35,94 @@ class RealCell:
         self._cell = cell
         self._chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
 
-    def tool_poses(self, robots: Sequence[str], q: Array) -> tuple[Array, ...]:
-        """Tool tips of some robots on the part, or in the world where a robot's task is given there.
+    def tool_poses(self, tasks: Sequence[Task], q: Array) -> tuple[Array, ...]:
+        """Tool tips of some tasks on the part, or in the world where a task is given there.
 
         Args:
+            tasks: The tasks.
             q: Stacked joint positions in [rad] or [m], shape (N, nq).
 
         Returns:
             Poses X_PT, shape (N, 4, 4) each.
         """
-        positions = {robot.name: q[:, self._cell.columns(robot.name)] for robot in self._cell.robots}
+        positions = self._positions(q)
         X_WP = part_poses(self._cell, self._chains, positions)
-        in_world = {task.robot for task in self._cell.tasks if task.relative_to is Frame.WORLD}
-        X_WT = {name: self._chains[name].tool_poses(positions[name]) for name in robots}
-        return tuple(X_WT[name] if name in in_world else inverse(X_WP) @ X_WT[name] for name in robots)
+        tips = ((task, self._chains[task.robot].tool_poses(positions[task.robot])) for task in tasks)
+        return tuple(relative_to_task_frame(task, X_WT, X_WP) for task, X_WT in tips)
+
+    def measured(
+        self, desired: Sequence[tuple[Task, Array]], q: Array, system: MeasurementEntry, rng: np.random.Generator
+    ) -> tuple[Array, ...]:
+        """Measurements of the tools of some tasks, shape (N, 4, 4) each.
+
+        Args:
+            desired: The tasks with their desired poses X_PT, shape (N, 4, 4).
+            q: Stacked joint positions in [rad] or [m], shape (N, nq).
+            system: What measures.
+            rng: Its noise; without noise no number is taken.
+
+        Raises:
+            InputError: A tip is behind the camera.
+        """
+        true = self.tool_poses([task for task, _ in desired], q)
+        if system.camera is None:
+            return measured_poses(true, system, rng)
+        X_WP = part_poses(self._cell, self._chains, self._positions(q))
+        return tuple(
+            seen_poses(system.camera, X_W, wanted, X_PT, rng)
+            for X_PT, (task, wanted) in zip(true, desired, strict=True)
+            for X_W in [np.eye(4)[None] if task.relative_to is Frame.WORLD else X_WP]
+        )
 
     def accuracy(self, schedule: Schedule, q: Array) -> tuple[TaskAccuracy, ...]:
         """True errors of all tasks of a schedule, for stacked joint positions of shape (N, nq)."""
-        poses = self.tool_poses([scheduled.task.robot for scheduled in schedule.tasks], q)
+        poses = self.tool_poses([scheduled.task for scheduled in schedule.tasks], q)
         return tuple(pose_accuracy(scheduled, X_PT) for scheduled, X_PT in zip(schedule.tasks, poses, strict=True))
+
+    def _positions(self, q: Array) -> dict[str, Array]:
+        """Stacked positions, shape (N, nq), by robot."""
+        return {robot.name: q[:, self._cell.columns(robot.name)] for robot in self._cell.robots}
+
+
+def seen_poses(camera: CameraEntry, X_WP: Array, desired: Array, actual: Array, rng: np.random.Generator) -> Array:
+    r"""Poses at which corrections take tools to be that a camera sees, shape (N, 4, 4).
+
+    It shows the difference of pixels ``r_d - r_n`` between desired and actual tips. The camera that corrections believe
+    in makes of it, at the depth of the desired tip, the displacement ``g(r_d - r_n)`` across its view ([Nicolato2007]_
+    Eq. 3.31). The tool is taken to stand that far from its desired pose, and to be turned as desired.
+
+    Args:
+        camera: The camera.
+        X_WP: The frame of the task, shape (N, 4, 4) or (1, 4, 4).
+        desired: Desired poses in it, shape (N, 4, 4).
+        actual: Actual ones, shape (N, 4, 4).
+        rng: Noise of columns and rows.
+
+    Raises:
+        InputError: A tip is behind the camera.
+    """
+    wanted, tips = ((X_WP @ X)[:, :3, 3] for X in (desired, actual))
+    difference = pixels(camera, wanted) - pixels(camera, tips)
+    if camera.noise_px > 0.0:
+        difference -= camera.noise_px * rng.standard_normal(difference.shape)
+    believed = camera.believed or camera
+    depth = transform_points(inverse(believed.at.matrix), wanted)[:, 2:]
+    shift_W = difference * depth / np.array(believed.focal_px) @ believed.at.matrix[:3, :2].T
+    seen = desired.copy()
+    seen[:, :3, 3] -= (np.swapaxes(X_WP[:, :3, :3], 1, 2) @ shift_W[..., None])[..., 0]
+    return seen
+
+
+def pixels(camera: CameraModelEntry, points_W: Array) -> Array:
+    """Column and row at which a camera sees points in the world in [m], shape (N, 3) to (N, 2).
+
+    Raises:
+        InputError: A point is not in front of it.
+    """
+    points = transform_points(inverse(camera.at.matrix), points_W)
+    if not (points[:, 2] > 0.0).all():
+        raise InputError("measurement.camera.at: expected all tips in front of the camera, got one behind it")
+    return np.array(camera.centre_px) + np.array(camera.focal_px) * points[:, :2] / points[:, 2:]
 
 
 def measured_poses(X_PT: Sequence[Array], system: MeasurementEntry, rng: np.random.Generator) -> tuple[Array, ...]:

@@ -38,6 +38,7 @@ def load_errors(path: Path | str, cell: Cell) -> CellErrors:
         robots=whole.robots,
         grasps=whole.grasp,
         measurement=whole.measurement,
+        simulation=whole.simulation,
         seed=whole.seed,
         trials=whole.trials,
         file=file,
@@ -58,6 +59,16 @@ def _unknown_names(document: YamlDocument, cell: Cell) -> Iterator[Finding]:
         if name not in cell.positioners:
             text = unknown_name("a robot that holds the part", name, cell.positioners)
             yield document.key_finding(("grasp", name), text)
+    for name, written in _mapping(_mapping(document.root, "simulation"), "robots").items():
+        place = ("simulation", "robots", name)
+        if name not in models:
+            yield document.key_finding(place, unknown_name("a robot of this cell", name, models))
+            continue
+        for key, figures in written.items() if isinstance(written, dict) else ():
+            for joint in figures if isinstance(figures, dict) else ():
+                if joint not in models[name].joint_names:
+                    text = unknown_name(f"a joint of '{name}'", joint, models[name].joint_names)
+                    yield document.key_finding((*place, key, joint), text)
 
 
 def _wrong_joints(

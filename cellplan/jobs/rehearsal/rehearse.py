@@ -1,6 +1,6 @@
 """Rehearse a cell with errors: solve it, execute the program on real cells, and correct it from measurements."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -10,7 +10,7 @@ from cellplan.checks.real_cell import RealCell, check_true_errors, path_figures,
 from cellplan.checks.verify import verify_motion, with_clearance
 from cellplan.errors import InputError
 from cellplan.files.run.joint_tables import parse_table
-from cellplan.jobs.rehearsal.correct import Pass, correct_from_pass_to_pass, correct_within_the_pass
+from cellplan.jobs.rehearsal.correct import Pass, Plant, correct_from_pass_to_pass, correct_within_the_pass
 from cellplan.model.cell.cell import Cell, stacked_positions
 from cellplan.model.cell.cell_errors import CellErrors
 from cellplan.model.motion.motion import Motion, Schedule
@@ -24,6 +24,7 @@ from cellplan.planning.path.build import build_toolpath
 from cellplan.runs.plan.program import ProgramClock
 from cellplan.runs.solution import Run
 from cellplan.runs.solve import render_program, solve, with_verdict
+from cellplan.scene.dynamics.simulated_cell import SimulatedCell
 from cellplan.scene.kinematics.perturbed_cell import draw_errors, perturbed_cell
 from cellplan.scene.scene import Scene
 
@@ -66,8 +67,8 @@ def rehearse(
         progress: Called with the stage and the fraction done.
 
     Raises:
-        InputError: The cell cannot be worked with, several robots hold the part, or there are more trials than can be
-            kept.
+        InputError: The cell cannot be worked with, several robots hold the part, there are more trials than can be
+            stored, a program from home to home is to be corrected, or a simulated arm has no masses or runs away.
         NoSolutionError: The cell has no solution.
     """
     if rounds < 1:
@@ -77,19 +78,28 @@ def rehearse(
             f"{cell.origin.at('part.held_by')}: expected one robot that holds the part, got {len(cell.part.held_by)}: "
             "the pose of a part between several holders depends on their stiffness, which a cell does not state"
         )
-    if cell.program.is_home_to_home:
-        raise InputError(
-            f"{cell.origin.at('program')}: expected a cell without a program from home to home, as rehearsals have no "
-            "measured errors of transfer moves; rehearse its tasks without this key"
-        )
     trials = errors.trials if errors.is_random else 1
-    _refuse_too_many(ProgramClock.from_cell(cell, plan_phases(cell)).schedules, trials, errors)
+    if not cell.program.is_home_to_home:
+        _refuse_too_many(ProgramClock.from_cell(cell, plan_phases(cell)).schedules, trials, errors)
+    elif feedback or in_pass:
+        raise InputError(
+            f"{cell.origin.at('program')}: expected a cell without a program from home to home for --feedback and "
+            "--in-pass, as corrected tasks would not begin and end where its transfer moves do; rehearse it without "
+            "them, or its tasks without this key"
+        )
     solution = solve(cell, is_reported=False, progress=progress)
     _refuse_too_many([run.schedule for run in solution.runs], trials, errors)  # again: a retimed one has other samples
     options = _Options(feedback=feedback, in_pass=in_pass, rounds=rounds)
+    jobs = [_pass(run) for run in solution.runs]
+    made: list[list[Trial]] = [[] for _ in jobs]
+    for number in range(trials):
+        progress("rehearsing", number / trials)
+        tried = _try(jobs, errors, number, options=options, progress=_within(progress, number, trials))
+        for into, trial in zip(made, tried, strict=True):
+            into.append(trial)
     runs = tuple(
-        _rehearse_run(solution.cell, run, errors, trials=trials, options=options, progress=progress)
-        for run in solution.runs
+        _run_rehearsal(job, run, tuple(of_run), options=options, progress=progress)
+        for job, run, of_run in zip(jobs, solution.runs, made, strict=True)
     )
     return Rehearsal(
         cell=solution.cell,
@@ -125,30 +135,30 @@ def _refuse_too_many(schedules: Sequence[Schedule], trials: int, errors: CellErr
         )
 
 
-def _rehearse_run(
-    cell: Cell, run: Run, errors: CellErrors, *, trials: int, options: _Options, progress: Progress
-) -> RunRehearsal:
-    """Execute one run on every real cell."""
-    job = Pass(
-        cell=cell,
+def _pass(run: Run) -> Pass:
+    """What stays the same of a run; in a program each has its own state of the part."""
+    return Pass(
+        cell=run.cell,
         schedule=run.schedule,
         moving=run.moving,
         judged_from=_judged_from(run.schedule),
-        q=stacked_positions(cell, run.report.q),
+        q=stacked_positions(run.cell, run.report.q),
     )
-    made = []
-    for number in range(trials):
-        progress("rehearsing", number / trials)
-        made.append(_try(job, errors, number, options=options, progress=_within(progress, number, trials)))
-    corrected = _corrected(job, made[0], run.phase, progress) if trials == 1 and options.feedback else None
+
+
+def _run_rehearsal(
+    job: Pass, run: Run, trials: tuple[Trial, ...], *, options: _Options, progress: Progress
+) -> RunRehearsal:
+    """All executions of one run."""
+    is_corrected = len(trials) == 1 and options.feedback
     return RunRehearsal(
         name=run.name,
         times=run.schedule.times,
         judged_from=job.judged_from,
-        trials=tuple(made),
-        before=_iso_figures(job, [trial.before for trial in made]),
-        after=_iso_figures(job, [trial.final for trial in made]) if options.feedback else None,
-        corrected=corrected,
+        trials=trials,
+        before=_iso_figures(job, [trial.before for trial in trials]),
+        after=_iso_figures(job, [trial.final for trial in trials]) if options.feedback else None,
+        corrected=_corrected(job, trials[0], run.phase, progress) if is_corrected else None,
     )
 
 
@@ -157,27 +167,47 @@ def _within(progress: Progress, number: int, trials: int) -> Progress:
     return lambda stage, share: progress(stage, (number + share) / trials)
 
 
-def _try(job: Pass, errors: CellErrors, number: int, *, options: _Options, progress: Progress) -> Trial:
-    """One real cell."""
-    draw = draw_errors(job.cell, errors, number)
-    real = RealCell(perturbed_cell(job.cell, draw))
-    system = errors.measurement
-    before = real.accuracy(job.schedule, job.q)
-    correction, in_pass = None, None
-    if options.feedback:
-        correction = correct_from_pass_to_pass(
-            job,
-            real,
-            system,
-            rng=np.random.default_rng([errors.seed, number, MEASUREMENT_STREAM]),
-            rounds=options.rounds,
-            on_round=lambda made: progress(f"correction, round {made}", made / (options.rounds + 1)),
+def _try(
+    jobs: Sequence[Pass], errors: CellErrors, number: int, *, options: _Options, progress: Progress
+) -> Iterator[Trial]:
+    """One real cell, run by run; arms go on from run to run of a program from home to home."""
+    arms: SimulatedCell | None = None
+    for job in jobs:
+        draw = draw_errors(job.cell, errors, number)
+        cell = perturbed_cell(job.cell, draw)
+        goes_on = arms is not None and cell.program.is_home_to_home
+        if arms is None:
+            arms = SimulatedCell(cell, errors.simulation, file=errors.file)
+        arms.carry(cell)
+        joints = arms.execute(job.schedule.times, job.q, goes_on=goes_on)
+        plant = Plant(
+            real=RealCell(cell), arms=arms, system=errors.measurement, rng=_rng(errors, number, MEASUREMENT_STREAM)
         )
-    if options.in_pass:
-        progress("correction within the pass", 1.0)
-        rng = np.random.default_rng([errors.seed, number, IN_PASS_STREAM])
-        in_pass = correct_within_the_pass(job, real, system, rng=rng)
-    return Trial(draw=draw, before=before, correction=correction, in_pass=in_pass)
+        before = plant.real.accuracy(job.schedule, joints.executed)
+        correction, in_pass = None, None
+        if options.feedback:
+            correction = correct_from_pass_to_pass(
+                job,
+                plant,
+                rounds=options.rounds,
+                on_round=lambda made: progress(f"correction, round {made}", made / (options.rounds + 1)),
+            )
+        if options.in_pass:
+            progress("correction within the pass", 1.0)
+            in_pass = correct_within_the_pass(job, replace(plant, rng=_rng(errors, number, IN_PASS_STREAM)))
+        yield Trial(
+            draw=draw,
+            before=before,
+            correction=correction,
+            in_pass=None if in_pass is None else in_pass[0],
+            joints=joints if arms.has_arms else None,
+            joints_in_pass=None if in_pass is None or not arms.has_arms else in_pass[1],
+        )
+
+
+def _rng(errors: CellErrors, number: int, stream: int) -> np.random.Generator:
+    """Random numbers of a trial."""
+    return np.random.default_rng([errors.seed, number, stream])
 
 
 def _corrected(job: Pass, trial: Trial, phase: Phase, progress: Progress) -> CorrectedProgram | None:

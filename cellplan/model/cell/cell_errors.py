@@ -9,6 +9,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.robot.robot import BASE, FollowerJoint, Joint, RobotModel
 from cellplan.model.settings.cell_errors import Amount, MeasurementEntry, PoseErrorEntry, RobotErrorsEntry, Spread
+from cellplan.model.settings.simulation import SimulationEntry
 from cellplan.model.settings.units import si_or_none
 
 SHORTEST_LINK: Final = 1e-9  # [m] axis points nearer than this give a link no direction
@@ -22,7 +23,8 @@ class CellErrors:
     robots: Mapping[str, RobotErrorsEntry] = field(default_factory=dict)
     # the real part seen from where it should be, by the robot that holds it
     grasps: Mapping[str, PoseErrorEntry] = field(default_factory=dict)
-    measurement: MeasurementEntry = field(default_factory=MeasurementEntry)  # noise of the measuring system
+    measurement: MeasurementEntry = field(default_factory=MeasurementEntry)  # the measuring system
+    simulation: SimulationEntry | None = None  # arms with masses; None where joints reach what they are commanded
     seed: int = 0  # seed of all samples
     trials: int = 1  # number of real cells that are drawn
     file: str = "<errors>"  # file name as the user gave it

@@ -85,6 +85,15 @@ class Correction:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointExecution:
+    """How joints execute commanded positions; columns are those of the stacked joint vector."""
+
+    commanded: Array  # in [rad] or [m], shape (N, nq)
+    executed: Array  # positions of the links, shape (N, nq)
+    torque: Array  # torques in [N m] or forces in [N]; 0 of robots that are not simulated, shape (N, nq)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trial:
     """One real cell."""
 
@@ -93,6 +102,9 @@ class Trial:
     correction: Correction | None  # result of the correction; None when it was not requested
     # true errors with correction within the pass; None when it was not requested or diverged
     in_pass: tuple[TaskAccuracy, ...] | None
+    # joints of simulated arms as solved, and with correction within the pass; None without such arms
+    joints: JointExecution | None = None
+    joints_in_pass: JointExecution | None = None
 
     @property
     def final(self) -> tuple[TaskAccuracy, ...]:

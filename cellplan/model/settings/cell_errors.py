@@ -1,18 +1,22 @@
-"""Errors of the real cell: joint zeros, link lengths, bases, tools, grasps, and the noise of the measuring system."""
+"""Errors of the real cell: joint zeros, link lengths, bases, tools, grasps; its measuring system and its drives."""
 
 from typing import Annotated, ClassVar, Final, Literal
 
 from pydantic import Field, Tag
 
-from cellplan.model.settings.entry import NOT_TURNED, ORIGIN, Entry, Name, OneOf, by_kind, setting
+from cellplan.model.settings.entry import NOT_TURNED, ORIGIN, Entry, Name, OneOf, PoseEntry, by_kind, setting
+from cellplan.model.settings.simulation import SampleTime, SimulationEntry
 from cellplan.model.settings.solver import LARGEST_SEED
 from cellplan.model.settings.units import Deg, Mm, Quantity, Within
 
 LARGEST_SHIFT_MM: Final = 1_000.0  # an error of a metre is a wrong unit
 LARGEST_TURN_ERROR_DEG: Final = 45.0  # likewise an eighth of a turn
 TRIAL_LIMIT: Final = 10_000
+MOST_PIXELS: Final = 1e6
 AMOUNT_WORDS: Final = "a number, {normal: NUMBER} or {uniform: NUMBER}"
 
+Focal = Annotated[float, Field(gt=0.0, le=MOST_PIXELS)]
+Pixels = Annotated[float, Field(ge=-MOST_PIXELS, le=MOST_PIXELS)]
 Shift = Annotated[Mm, Within(ge=-LARGEST_SHIFT_MM, le=LARGEST_SHIFT_MM)]
 Turn = Annotated[Deg, Within(ge=-LARGEST_TURN_ERROR_DEG, le=LARGEST_TURN_ERROR_DEG)]
 ShiftWidth = Annotated[Mm, Within(ge=0.0, le=LARGEST_SHIFT_MM)]
@@ -87,9 +91,37 @@ class RobotErrorsEntry(Entry):
         return {**self.joint_offsets_deg, **self.joint_offsets_mm}
 
 
+class CameraModelEntry(Entry):
+    """A camera without distortion: a point at (x, y, z) in its frame is seen at ``centre + focal (x, y) / z``."""
+
+    focal_px: tuple[Focal, Focal] = Field(description="Focal length in columns and in rows.")
+    centre_px: tuple[Pixels, Pixels] = setting((0.0, 0.0), "Column and row of the optical axis.")
+    at: PoseEntry = Field(description="Pose in the world: z along the view, x along the rows, y down the columns.")
+
+
+class CameraEntry(CameraModelEntry):
+    """A camera beside the cell that sees the tips of the tools and their desired places."""
+
+    believed: CameraModelEntry | None = setting(
+        None, "What corrections take it for; when absent, what it is. Only differences of pixels are used."
+    )
+    noise_px: Annotated[float, Field(ge=0.0, le=MOST_PIXELS)] = setting(
+        0.0, "Standard deviation of column and row of a tip."
+    )
+
+
 class MeasurementEntry(Entry):
     """The measuring system that measures the tools relative to the part."""
 
+    camera: CameraEntry | None = setting(
+        None, "Measures positions across its view only, in place of a system that measures poses."
+    )
+    period_ms: SampleTime | None = setting(
+        None, "Time between two measurements within a pass; when absent, that of the samples."
+    )
+    share: Annotated[float, Field(gt=0.0, le=1.0)] = setting(
+        1.0, "Part of a measured error that is corrected at once within a pass."
+    )
     position_noise_mm: ShiftWidth = setting(Mm(0.0), "Standard deviation of each measured coordinate of a tool tip.")
     orientation_noise_deg: TurnWidth = setting(
         Deg(0.0), "Standard deviation of each measured small turn about the part's axes."
@@ -110,4 +142,7 @@ class ErrorsDocument(Entry):
     grasp: dict[Name, PoseErrorEntry] = setting(
         {}, "Pose of the actual part in the nominal part frame, by the name of the robot that holds it."
     )
-    measurement: MeasurementEntry = setting(MeasurementEntry(), "Noise of the measuring system.")
+    measurement: MeasurementEntry = setting(MeasurementEntry(), "The measuring system.")
+    simulation: SimulationEntry | None = setting(
+        None, "Arms with masses and joint controllers; when absent, joints reach exactly what they are commanded."
+    )

@@ -24,6 +24,7 @@ SETTLING_STEPS: Final = 60  # Newton steps from one start posture to the next; a
 START_MEASUREMENTS: Final = 6  # times that standing tools are measured and put right before a pass begins
 
 Measure = Callable[[Array], Sequence[Array]]  # stacked joints (1, nq) -> X_PT of every task, (1, 4, 4) each
+Observe = Callable[[int, Array], Sequence[Array] | None]  # the same at one sample after the other, where measured
 
 
 def corrected_references(desired: Schedule, references: Schedule, measured: Sequence[Array]) -> Schedule:
@@ -58,6 +59,12 @@ def displaced(task: Task, X_desired: Array, X_measured: Array, *, nominal: Array
     return pose_from(turn @ nominal[:, :3, :3], tip + error[:, :3] + lever)
 
 
+def partly(task: Task, X_desired: Array, X_measured: Array, *, share: float) -> Array:
+    """Poses that are off the desired ones by a share of what the measured ones are, shape (N, 4, 4)."""
+    error = share * pose_errors(X_desired, X_measured, [task.is_spin_free] * len(X_desired))
+    return pose_from(rotation_exp(-error[:, 3:]) @ X_desired[:, :3, :3], X_desired[:, :3, 3] - error[:, :3])
+
+
 def settled_start(motion: MotionTask) -> Array:
     """The configuration near the start from which the model's tools stand on the first references, shape (nq,)."""
     cell = motion.cell
@@ -80,7 +87,7 @@ def measured_start(motion: MotionTask, *, measure: Measure) -> Array:
     """Configuration from which the real tools stand on the first poses of their tasks, shape (nq,).
 
     The standing tools are measured and put right several times: a pass that began with the whole error would begin with
-    a jerk. The arguments are those of `integrate_measured`.
+    a jerk.
     """
     desired = motion.schedule
     first = Schedule(times=desired.times[:1], tasks=tuple(_standing(task, 1) for task in desired.tasks))
@@ -91,14 +98,16 @@ def measured_start(motion: MotionTask, *, measure: Measure) -> Array:
     return q
 
 
-def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
+def integrate_measured(motion: MotionTask, *, observe: Observe) -> Motion:
     r"""Follow a schedule with the error measured at each sample fed back at once ([Nicolato2007]_ section 3.5).
 
     At sample k the method is given ``Delta(k) X_nominal(q_k)`` in place of the desired pose, with ``Delta`` of
     `corrected_references`, and for the next sample the displacement from what is measured now to what is desired then.
+    Until the next measurement references are displaced from this one on.
 
     Args:
         motion: The tasks in the written cell: what the method knows.
+        observe: Measures the tools at the first sample, and at those of the others at which there is a measurement.
     """
     cell, desired = motion.cell, motion.schedule
     targets, _ = motion.references()
@@ -107,11 +116,16 @@ def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
     advance = method_named(cell.solver.method)(problem)
     q = np.empty((len(desired.times), cell.joint_count))
     q[0] = motion.start
+    anchors: list[tuple[Array, Array]] = []  # measured and nominal poses at the last measurement, by task
     for k in range(len(q) - 1):
-        state = problem.state(q[k])
-        nominal = inverse(problem.constraints.reference_frames(state.X_WP)) @ state.X_WT[problem.constraints.operators]
-        for place, (scheduled, X_seen) in enumerate(zip(desired.tasks, measure(q[k : k + 1]), strict=True)):
-            seen, model = np.repeat(X_seen, 2, axis=0), np.repeat(nominal[place : place + 1], 2, axis=0)
+        if (measured := observe(k, q[k : k + 1])) is not None:
+            state = problem.state(q[k])
+            frames = inverse(problem.constraints.reference_frames(state.X_WP))
+            nominal = frames @ state.X_WT[problem.constraints.operators]
+            anchors = [
+                (np.repeat(X, 2, axis=0), np.repeat(N[None], 2, axis=0)) for X, N in zip(measured, nominal, strict=True)
+            ]
+        for place, (scheduled, (seen, model)) in enumerate(zip(desired.tasks, anchors, strict=True)):
             references[k : k + 2, place] = displaced(scheduled.task, targets[k : k + 2, place], seen, nominal=model)
         q[k + 1] = step_from(problem, advance, k, q[k]).q
     return Motion(times=desired.times, q=q)

@@ -121,7 +121,9 @@ def _displaced(model: RobotModel, D: Array, *, by_moved: bool) -> RobotModel:
         _moved(axis, D[n + k + 1 if by_moved else axis.parent + 1]) for k, axis in enumerate(model.followers)
     )
     bodies = tuple(replace(body, X_BS=D[body.link + 1] @ body.X_BS) for body in model.bodies)
-    return replace(model, joints=joints, followers=followers, X_BF=D[model.flange_link + 1] @ model.X_BF, bodies=bodies)
+    inertias = None if model.inertias is None else tuple(it.displaced(D[it.link + 1]) for it in model.inertias)
+    X_BF = D[model.flange_link + 1] @ model.X_BF
+    return replace(model, joints=joints, followers=followers, X_BF=X_BF, bodies=bodies, inertias=inertias)
 
 
 def _moved(axis: Axis, D: Array) -> Axis:
