@@ -51,6 +51,7 @@ def rehearsal_record(rehearsal: Rehearsal, *, provenance: Provenance) -> Record:
         "in_pass": rehearsal.has_in_pass,
         "tables_released": rehearsal.is_released,
         "measurement": entry_record(errors.measurement),
+        "simulated": _simulated_record(rehearsal),
         "tasks": {name: record for run in rehearsal.runs for name, record in _tasks_record(cell, run).items()},
         "runs": [_run_record(cell, run) for run in rehearsal.runs],
         "checks": [check_record(check) for check in rehearsal.checks],
@@ -61,6 +62,27 @@ def rehearsal_record(rehearsal: Rehearsal, *, provenance: Provenance) -> Record:
         "seed": errors.seed,
         "caution": CAUTION,
     }
+
+
+def _simulated_record(rehearsal: Rehearsal) -> Record:
+    """Largest joint errors and torques of simulated arms over all runs and trials, by robot and joint."""
+    cell, simulation = rehearsal.cell, rehearsal.errors.simulation
+    made = [trial.joints for run in rehearsal.runs for trial in run.trials if trial.joints is not None]
+    if simulation is None or not made:
+        return {}
+    errors = np.max([np.abs(it.executed - it.commanded).max(axis=0) for it in made], axis=0)
+    torques = np.max([np.abs(it.torque).max(axis=0) for it in made], axis=0)
+    record: dict[str, Any] = {}
+    for name in simulation.robots:
+        joints, columns = cell.robot(name).model.joints, cell.columns(name)
+        record[name] = {
+            joint.name: {
+                f"max_error_{joint.display_unit.name}": number(error, joint.display_unit.scale),
+                f"max_torque_{'nm' if joint.is_revolute else 'n'}": number(torque),
+            }
+            for joint, error, torque in zip(joints, errors[columns], torques[columns], strict=True)
+        }
+    return record
 
 
 def _tasks_record(cell: Cell, run: RunRehearsal) -> Record:

@@ -90,7 +90,7 @@ def rehearse(
     solution = solve(cell, is_reported=False, progress=progress)
     _refuse_too_many([run.schedule for run in solution.runs], trials, errors)  # again: a retimed one has other samples
     options = _Options(feedback=feedback, in_pass=in_pass, rounds=rounds)
-    jobs = [_pass(run) for run in solution.runs]
+    jobs = [_pass(solution.cell, run) for run in solution.runs]
     made: list[list[Trial]] = [[] for _ in jobs]
     for number in range(trials):
         progress("rehearsing", number / trials)
@@ -135,13 +135,17 @@ def _refuse_too_many(schedules: Sequence[Schedule], trials: int, errors: CellErr
         )
 
 
-def _pass(run: Run) -> Pass:
-    """What stays the same of a run; in a program each has its own state of the part."""
+def _pass(cell: Cell, run: Run) -> Pass:
+    """What stays the same of a run; in a program each has its own state of the part, and moves that are no tasks."""
+    names = {task.name for task in cell.tasks}
+    schedule = run.schedule
+    if not names.issuperset(schedule.names):
+        schedule = replace(schedule, tasks=tuple(it for it in schedule.tasks if it.task.name in names), paths=())
     return Pass(
         cell=run.cell,
-        schedule=run.schedule,
+        schedule=schedule,
         moving=run.moving,
-        judged_from=_judged_from(run.schedule),
+        judged_from=_judged_from(schedule),
         q=stacked_positions(run.cell, run.report.q),
     )
 

@@ -1,5 +1,6 @@
 """A rehearsal as text, plots, page, tables and files: what is shown, and in which order."""
 
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -44,6 +45,7 @@ OUTCOMES: Final = {
     "diverged": "does not converge: the error grew, or the corrected references cannot be followed",
     "unfinished": "has not converged: allow more --rounds",
 }
+_JOINT_FIGURES: Final = (("error", "deg", "deg"), ("error", "mm", "mm"), ("torque", "nm", "N m"), ("torque", "n", "N"))
 ON_PAGE: Final = OUTCOMES | {
     "stalled": "does not converge: the error stopped decreasing above the tolerance",
     "unfinished": "has not converged within the allowed rounds",
@@ -59,6 +61,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
     return [
         f"{record['cell']}: {record['status']}",
         f"  mode {record['mode']}, {seconds(record['cycle_time_s'])} s, rehearsed on {cells}, seed {record['seed']}",
+        *(f"  simulated arm {line}" for line in simulated_lines(record)),
         *_task_lines(record),
         *_repeatability_lines(record["tasks"]),
         *_round_lines(record["runs"]),
@@ -81,6 +84,19 @@ def _task_lines(record: Record) -> Iterator[str]:
                 )
             elif key == "in_pass" and record["in_pass"]:
                 yield f"{place}: the path was lost"
+
+
+def simulated_lines(record: Record) -> Iterator[str]:
+    """The largest joint error and the largest torque of each simulated arm, with their joints."""
+    for robot, joints in record["simulated"].items():
+        figures = [(key, value, name) for name, joint in joints.items() for key, value in joint.items()]
+        words = []
+        for kind, unit, printed in _JOINT_FIGURES:
+            found = [(value, name) for key, value, name in figures if key == f"max_{kind}_{unit}"]
+            if found:
+                value, name = max(found)
+                words.append(f"{kind} {small(value)} {printed} ({name})")
+        yield f"{robot}: joint {', '.join(words)}"
 
 
 def _repeatability_lines(tasks: Record) -> Iterator[str]:
@@ -119,6 +135,7 @@ def rehearsal_figures(rehearsal: Rehearsal) -> dict[str, Figure]:
             for name, pick in EXECUTIONS.items():
                 figures |= _execution_figures(rehearsal.cell, run, place, name=name, pick=pick)
             figures |= _round_figures(rehearsal.cell, run, errors.task)
+        figures |= _joint_figures(rehearsal, run)
     return figures
 
 
@@ -139,6 +156,32 @@ def _execution_figures(cell: Cell, run: RunRehearsal, place: int, *, name: str, 
     figures = {f"{name}_{task.name}": Figure(title=title, x=time_axis(run.times), panels=panels, columns=2)}
     if len(selected) > 1:
         figures |= _envelope_figures(run, [errors for _, errors in selected], name=name)
+    return figures
+
+
+def _joint_figures(rehearsal: Rehearsal, run: RunRehearsal) -> dict[str, Figure]:
+    """Joint errors of the simulated arms over time, in the first trial."""
+    cell, simulation, joints = rehearsal.cell, rehearsal.errors.simulation, run.trials[0].joints
+    if simulation is None or joints is None:
+        return {}
+    figures = {}
+    for name in simulation.robots:
+        axes, columns = cell.robot(name).model.joints, cell.columns(name)
+        scales = np.array([joint.display_unit.scale for joint in axes])
+        errors = scales * (joints.executed - joints.commanded)[:, columns]
+        limit = max(float(np.abs(errors).max()), 1e-12)
+        units = " or ".join(dict.fromkeys(joint.display_unit.name for joint in axes))
+        panel = PlotPanel(
+            title=f"executed less commanded, in {units}",
+            y=value_axis(-limit, limit, unit=units),
+            items=[
+                PlotCurve(joint.name, run.times, errors[:, index], ROBOTS[index % len(ROBOTS)])
+                for index, joint in enumerate(axes)
+            ],
+        )
+        figures["_".join(["joints", *re.findall(r"[\w-]+", f"{run.name or ''} {name}")])] = Figure(
+            title=f"{name}: joint errors of the simulated arm", x=time_axis(run.times), panels=[panel], columns=1
+        )
     return figures
 
 
@@ -199,7 +242,8 @@ def _rounds(curves: Sequence[Array], *, title: str, unit: str, allowed: float) -
 
 def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) -> str:
     """The page of a rehearsal."""
-    parts = {"plots": inline_plots(plots), "executions": TITLES, "outcomes": ON_PAGE}
+    simulated = list(simulated_lines(record))
+    parts = {"plots": inline_plots(plots), "executions": TITLES, "outcomes": ON_PAGE, "simulated": simulated}
     return cell_page("jobs/rehearsal/rehearsal.html", record, cell, parts)
 
 

@@ -1,7 +1,7 @@
 """Masses and inertias of links and of what a flange carries."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,11 @@ class LinkInertia:
     mass: float  # in [kg]
     centre_B: Array  # its centre in [m], shape (3,)
     inertia_B: Array  # about its centre in [kg m^2], shape (3, 3)
+
+    def displaced(self, D: Array) -> "LinkInertia":
+        """The same mass after a displacement, shape (4, 4)."""
+        R = D[:3, :3]
+        return replace(self, centre_B=R @ self.centre_B + D[:3, 3], inertia_B=R @ self.inertia_B @ R.T)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

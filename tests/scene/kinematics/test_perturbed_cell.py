@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.dynamic_robots import random_robot
 from builders.random_cells import random_model, random_pose
 
 from cellplan import load_cell
@@ -12,6 +13,7 @@ from cellplan.model.cell.cell import Robot, Tool
 from cellplan.model.cell.cell_errors import CellErrors, Draw, RobotDraw, link_vector, sample
 from cellplan.model.settings.cell_errors import PoseErrorEntry, RobotErrorsEntry, ShiftSpreadEntry, TurnSpreadEntry
 from cellplan.model.settings.units import Mm
+from cellplan.scene.dynamics.newton_euler import JointRows, joint_torques
 from cellplan.scene.kinematics.perturbed_cell import draw_errors, perturbed_cell
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
@@ -163,3 +165,17 @@ def test_what_is_mounted_on_a_link_goes_with_it_as_its_own_bodies_do(cell):
 
     assert len(real.model.bodies) == len(left.model.bodies)
     np.testing.assert_allclose(real.attachments[0].X_BS, real.model.bodies[-1].X_BS, atol=ROUNDING)
+
+
+def test_masses_go_with_their_links(cell):
+    """A joint offset means a posture that much further on for what weighs on the joints, too."""
+    rng = np.random.default_rng(5)
+    robot = replace(random_robot(4), name="left")
+    offsets, q = 0.1 * rng.normal(size=6), rng.normal(size=(3, 6))
+    still = JointRows(q=q, qd=np.zeros_like(q), qdd=np.zeros_like(q))
+
+    real = with_robot(cell, robot)
+    moved = perturbed_cell(real, draw_of(real, left={"joint_offsets": offsets})).robot("left")
+
+    expected = joint_torques(ScrewChain(robot), robot.model, replace(still, q=q + offsets)).joints
+    np.testing.assert_allclose(joint_torques(ScrewChain(moved), moved.model, still).joints, expected, atol=1e-9)
