@@ -69,8 +69,8 @@ class RealCell:
             return measured_poses(true, system, rng)
         X_WP = part_poses(self._cell, self._chains, self._positions(q))
         return tuple(
-            seen_poses(system.camera, X_W, wanted, X_PT, rng)
-            for X_PT, (task, wanted) in zip(true, desired, strict=True)
+            seen_poses(system.camera, X_W, goals, X_PT, rng)
+            for X_PT, (task, goals) in zip(true, desired, strict=True)
             for X_W in [np.eye(4)[None] if task.relative_to is Frame.WORLD else X_WP]
         )
 
@@ -101,12 +101,12 @@ def seen_poses(camera: CameraEntry, X_WP: Array, desired: Array, actual: Array, 
     Raises:
         InputError: A tip is behind the camera.
     """
-    wanted, tips = ((X_WP @ X)[:, :3, 3] for X in (desired, actual))
-    difference = pixels(camera, wanted) - pixels(camera, tips)
+    goals, tips = ((X_WP @ X)[:, :3, 3] for X in (desired, actual))
+    difference = pixels(camera, goals) - pixels(camera, tips)
     if camera.noise_px > 0.0:
         difference -= camera.noise_px * rng.standard_normal(difference.shape)
     believed = camera.believed or camera
-    depth = transform_points(inverse(believed.at.matrix), wanted)[:, 2:]
+    depth = transform_points(inverse(believed.at.matrix), goals)[:, 2:]
     shift_W = difference * depth / np.array(believed.focal_px) @ believed.at.matrix[:3, :2].T
     seen = desired.copy()
     seen[:, :3, 3] -= (np.swapaxes(X_WP[:, :3, :3], 1, 2) @ shift_W[..., None])[..., 0]

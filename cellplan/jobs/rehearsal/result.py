@@ -92,9 +92,9 @@ def simulated_lines(record: Record) -> Iterator[str]:
         figures = [(key, value, name) for name, joint in joints.items() for key, value in joint.items()]
         words = []
         for kind, unit, printed in _JOINT_FIGURES:
-            found = [(value, name) for key, value, name in figures if key == f"max_{kind}_{unit}"]
-            if found:
-                value, name = max(found)
+            stated = [(value, name) for key, value, name in figures if key == f"max_{kind}_{unit}"]
+            if stated:
+                value, name = max(stated)
                 words.append(f"{kind} {small(value)} {printed} ({name})")
         yield f"{robot}: joint {', '.join(words)}"
 

@@ -55,7 +55,7 @@ class SimulatedRobotEntry(Entry):
     )
     feedforward: Feedforward = setting(
         "none",
-        "Torque that the controllers add: none; gravity of the reference posture; or dynamics, which the reference "
+        "Torque that the controllers add: none; gravity at the reference; or dynamics, which the reference "
         "motion needs with these masses and this friction.",
     )
 
