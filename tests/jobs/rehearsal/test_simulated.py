@@ -1,6 +1,7 @@
 """Rehearsals with simulated arms and a camera: what they execute, how frames correct, programs from home to home."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -58,8 +59,7 @@ def test_tools_are_where_the_executed_joints_have_them(pair):
 
 def test_stiffer_controllers_with_feedforward_follow_better(pair):
     loose, stiff = (
-        rehearse(pair, CellErrors(simulation=simulation(**settings))).runs[0]
-        for settings in (LOOSE, STIFF)
+        rehearse(pair, CellErrors(simulation=simulation(**settings))).runs[0] for settings in (LOOSE, STIFF)
     )
 
     assert joint_errors(stiff).max() < 0.1 * joint_errors(loose).max()
@@ -163,7 +163,7 @@ def test_a_program_from_home_to_home_is_executed_as_a_whole(cells):
 
     columns = cell.columns("left")
     joints = [run.trials[0].joints for run in made.runs]
-    for before, after in zip(joints, joints[1:], strict=False):  # the same row: nothing is begun anew
+    for before, after in pairwise(joints):  # the same row: nothing is begun anew
         np.testing.assert_array_equal(before.executed[-1, columns], after.executed[0, columns])
         np.testing.assert_array_equal(before.torque[-1], after.torque[0])
     assert {task.task for run in made.runs for task in run.trials[0].before} == {task.name for task in cell.tasks}

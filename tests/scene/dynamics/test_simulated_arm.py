@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-
 from builders.dynamic_robots import random_robot
 from builders.scene_builders import joint, placed
+
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import pose
 from cellplan.model.robot.inertia import CarriedMass, LinkInertia
@@ -32,7 +32,13 @@ def chain(count, *, upright=False):
         for i in range(count)
     )
     model = RobotModel(
-        name="chain", source="test", joints=joints, flange_link=count - 1, X_BF=pose(ends[-1]), bodies=(), inertias=masses
+        name="chain",
+        source="test",
+        joints=joints,
+        flange_link=count - 1,
+        X_BF=pose(ends[-1]),
+        bodies=(),
+        inertias=masses,
     )
     return placed("arm", model, base=np.eye(4))
 
