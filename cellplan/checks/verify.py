@@ -1,6 +1,6 @@
 """Verification: all results of a run are computed here, from the joint tables that were read back."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from cellplan.checks.clearance.tool_depth import check_depths, check_standoffs
 from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
 from cellplan.checks.joints.demanded_feeds import check_feeds
 from cellplan.checks.joints.drift import check_joint_drift, repeatability
+from cellplan.checks.joints.forces import check_forces
 from cellplan.checks.joints.greatest_feeds import greatest_feeds
 from cellplan.checks.joints.limits import check_joints, check_shown, check_sums
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
@@ -33,6 +34,7 @@ from cellplan.checks.tools.weld_position import check_arcs, check_weld_positions
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.measures.base_reactions import base_reactions
+from cellplan.measures.forces.static_forces import force_report
 from cellplan.measures.joint_use import joint_uses
 from cellplan.measures.standoff import standoffs
 from cellplan.measures.tool_depth import tool_depths
@@ -108,9 +110,9 @@ def verify_motion(
     checks += [*joint_checks, *check_accelerations(cell, accelerations), *check_tool_speeds(cell, speeds)]
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
-    checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
-    checks += [*check_payload(loads), *_seam_checks(scene, schedule, q, X_WP)]
-    checks += check_transfer_speeds(scene, schedule, uses, q) if moving else []
+    forces = force_report(cell, scene.chains, schedule, q, X_WP, closures)
+    checks += [*check_idle(cell, idle, schedule.times, q), *check_payload(loads), *check_forces(cell, forces)]
+    checks += _task_checks(scene, schedule, q, X_WP, uses if moving else ())
     return Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
@@ -133,15 +135,9 @@ def verify_motion(
         accelerations=accelerations,
         loads=loads,
         base_reactions=tuple(base_reactions(cell, scene.chains, schedule.times, q)),
+        forces=forces,
         greatest_feeds=greatest_feeds(scene, schedule, q, accuracy),
     )
-
-
-def _seam_checks(scene: Scene, schedule: Schedule, q: RobotRows, X_WP: Array) -> list[Check]:
-    """Positions of welds, arcs of tools, and distances from seams and walls."""
-    cell, chains = scene.cell, scene.chains
-    welds, arcs = check_weld_positions(schedule, chains, q, X_WP), check_arcs(cell, schedule, chains, q)
-    return [*welds, *arcs, *check_seam_distances(cell, schedule, chains, q, X_WP)]
 
 
 def with_clearance(
@@ -200,6 +196,18 @@ def _errors(
     accuracy = tuple(replace(error, listed=listed.get(error.task)) for error in errors)
     closures = closure_accuracy(scene.cell, scene.chains, q, X_WP)
     return check_between_rows(scene, schedule, q, accuracy=accuracy, closures=closures)
+
+
+def _task_checks(
+    scene: Scene, schedule: Schedule, q: RobotRows, X_WP: Array, uses: Sequence[JointUse]
+) -> Iterator[Check]:
+    """Demanded feeds, what welds demand of tools, and speeds of transfer moves where joints may move."""
+    cell, chains = scene.cell, scene.chains
+    yield from check_feeds(scene, schedule, q, X_WP)
+    yield from check_weld_positions(schedule, chains, q, X_WP)
+    yield from check_arcs(cell, schedule, chains, q)
+    yield from check_seam_distances(cell, schedule, chains, q, X_WP)
+    yield from check_transfer_speeds(scene, schedule, uses, q) if uses else ()
 
 
 def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccuracy]) -> list[Check]:

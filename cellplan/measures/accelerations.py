@@ -36,12 +36,21 @@ def point_accelerations(times: Array, points: Array) -> Array:
         times: Times in [s], shape (N,), N >= 2.
         points: Positions, shape (N, ...): points in the world in [m], or joints in [rad] or [m].
     """
+    return changes_of_velocity(times, np.diff(points, axis=0) / _spread(np.diff(times), points))
+
+
+def changes_of_velocity(times: Array, velocities: Array) -> Array:
+    """Accelerations at the rows, shape (N, ...), from the velocities of the steps, shape (N - 1, ...), likewise."""
     steps = np.diff(times)
-    spread = (-1, *[1] * (points.ndim - 1))
-    velocities = np.zeros((len(times) + 1, *points.shape[1:]))
-    velocities[1:-1] = np.diff(points, axis=0) / steps.reshape(spread)
+    padded = np.zeros((len(times) + 1, *velocities.shape[1:]))
+    padded[1:-1] = velocities
     around = 0.5 * (np.concatenate([steps[:1], steps]) + np.concatenate([steps, steps[-1:]]))
-    return np.diff(velocities, axis=0) / around.reshape(spread)
+    return np.diff(padded, axis=0) / _spread(around, padded)
+
+
+def _spread(times: Array, values: Array) -> Array:
+    """Times of shape (N,) beside values of shape (M, ...)."""
+    return times.reshape(-1, *[1] * (values.ndim - 1))
 
 
 def row_motion(times: Array, q: Array) -> tuple[Array, Array]:

@@ -24,17 +24,19 @@ from cellplan.model.settings.entry import (
     rule,
     setting,
 )
+from cellplan.model.settings.forces import GripEntry
 from cellplan.model.settings.layout import LayoutEntry
 from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.program import ProgramEntry
 from cellplan.model.settings.solver import SolverEntry
-from cellplan.model.settings.units import Mm, Ms, Within
+from cellplan.model.settings.units import Deg, Mm, Ms, NmPerDeg, NPerMm, Within
 
 SCHEMA_VERSION: Final = 1
 ROBOT_LIMIT: Final = 64
 TASK_LIMIT: Final = 200
 OBSTACLE_LIMIT: Final = 500
 GRIP_LIMIT: Final = 200  # bodies of one gripper
+LARGEST_STIFFNESS: Final = 1e6  # [N/mm] or [Nm/deg]: no arm is stiffer
 SAMPLE_LIMIT: Final = 2_000_000  # tables longer than this fill disks, not controllers
 ALL_AXES: Final[tuple[TaskAxis, ...]] = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -60,11 +62,26 @@ class GraspEntry(Entry):
         min_length=1,
         max_length=GRIP_LIMIT,
     )
+    stiffness_n_mm: Annotated[NPerMm, Within(gt=0.0, le=LARGEST_STIFFNESS)] | None = setting(
+        None, "Stiffness of robot, gripper and grip at the tool tip, in N per mm; for internal forces between holders."
+    )
+    stiffness_nm_deg: Annotated[NmPerDeg, Within(gt=0.0, le=LARGEST_STIFFNESS)] | None = setting(
+        None, "Likewise of a rotation about the tip, in Nm per deg."
+    )
+    closure_error_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = setting(
+        Mm(0.0), "Distance by which a further holder is off its grasp in the real cell, in any direction."
+    )
+    closure_error_deg: Annotated[Deg, Within(ge=0.0, le=180.0)] = setting(Deg(0.0), "Likewise its angle.")
+    grip: GripEntry | None = setting(None, "Grip that holds the part by friction; absent: it is fastened otherwise.")
 
     @model_validator(mode="after")
     def _has_unique_axes(self) -> Self:
-        """Each axis once."""
+        """Each axis once; a stiffness for each kind of component that the grasp has."""
         require_unique(self.axes, "axes")
+        keys = ("stiffness_n_mm", "stiffness_nm_deg")
+        for key, other, components in (*zip(keys, keys[::-1], ("xyz", ("rx", "ry", "rz")), strict=True),):
+            if getattr(self, key) is None and getattr(self, other) is not None and set(components) & set(self.axes):
+                raise rule(f"missing, expected beside {other}, as the grasp keeps {' '.join(components)}", key)
         return self
 
 
@@ -121,6 +138,10 @@ class PartEntry(Entry):
         if self.held_by and set(self.held_by[0].axes) != set(ALL_AXES):
             words = "unexpected key, the first holder carries the part frame; further holders may leave axes open"
             raise rule(words, "held_by[0].axes")
+        for key in ("closure_error_mm", "closure_error_deg"):
+            if self.held_by and getattr(self.held_by[0], key):
+                words = "unexpected key, the first holder carries the part frame; errors are those of further holders"
+                raise rule(words, f"held_by[0].{key}")
         return self
 
 

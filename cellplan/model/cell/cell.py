@@ -21,6 +21,7 @@ from cellplan.model.robot.robot import Body, JointLimits, JointSum, RobotModel
 from cellplan.model.settings.assign import AssignEntry
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
+from cellplan.model.settings.forces import GripEntry
 from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.program import NoTransfers, ProgramEntry
 from cellplan.model.settings.solver import SolverEntry
@@ -127,6 +128,11 @@ class Grasp:
     depth: float = 0.002  # by how much in [m] what grips may reach into the part
     # names of the bodies that grip, as reports show them; None for all that is rigid with the flange
     bodies: tuple[str, ...] | None = None
+    # of robot, gripper and grip at the tip in [N/m] and [N m/rad], infinite for components that it leaves open; None
+    # when it is not stated
+    stiffness: tuple[float, float] | None = None
+    closure_error: tuple[float, float] = (0.0, 0.0)  # by how much it is off the grasp in the real cell, [m] and [rad]
+    grip: GripEntry | None = None  # pads that hold the part by friction; None for another fastening, or not stated
 
     @property
     def name(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import Mesh
 from cellplan.model.cell.cell import Part
+from cellplan.model.settings.task import ProcessEntry
 from cellplan.model.task.path_direction import PLANE_AXES, outside_of, plane_axes
 from cellplan.model.task.seam import Seam, WallPlace
 from cellplan.model.task.task import (
@@ -66,8 +67,16 @@ def mirrored_task(task: Task, plane: PlaneName) -> Task:
         plane_offset=-task.plane_offset if is_across else task.plane_offset,
         seam=None if task.seam is None else _seam(task.seam, S),
         weave=None if task.weave is None else replace(task.weave, side=-task.weave.side),
+        process=None if task.process is None else _process(task.process, S),
     )
     return replace(mirrored, path=_path(task, mirrored, S))
+
+
+def _process(process: ProcessEntry, S: Array) -> ProcessEntry:
+    """A process whose force is mirrored with its frame; that in the world stays, as the world does."""
+    if process.force is None or process.force.frame == "world":
+        return process
+    return process.changed(force=process.force.mirrored(OF_TOOL if process.force.frame == "tool" else S))
 
 
 def _seam(seam: Seam, S: Array) -> Seam:

@@ -98,6 +98,8 @@ _LISTED: Final = (  # the gravest first
     CheckKind("payload_centre", "centre of mass of the load within its limits", "Centre of mass of the load"),
     CheckKind("payload_moment", "moments of the load on the wrist within their limits", "Moment of the load"),
     CheckKind("payload_inertia", "inertia of the load on the wrist within its limits", "Inertia of the load"),
+    CheckKind("process_moment", "moments of load and process on the wrist within their limits", "Moment of load and process"),
+    CheckKind("grip_slip", "friction of grips holds the part", "Grip does not hold the part", group="grips"),
     CheckKind("coming_apart", "pairs that begin too near only come apart", "Pair does not come apart", excess=DISTANCE),
     CheckKind("clearance", "required clearance kept", "Clearance too small", excess=DISTANCE, concern=NEAR),
     CheckKind("stop_clearance", "required clearance kept where a robot stops", "Clearance too small where a robot stops", excess=DISTANCE),

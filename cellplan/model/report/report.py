@@ -12,6 +12,7 @@ from cellplan.model.presented import Presented
 from cellplan.model.report.base_reaction import BaseReaction
 from cellplan.model.report.between_rows import BetweenRows
 from cellplan.model.report.check_kinds import CHECK_KINDS, CheckKind
+from cellplan.model.report.forces import NO_FORCES, ForceReport
 from cellplan.model.report.greatest_feed import GreatestFeed
 from cellplan.model.report.left_out import LeftOut
 from cellplan.model.report.skew import SkewReport
@@ -292,6 +293,7 @@ class Report(Presented):
         standoffs: Distance of tool tips from the part, one entry per task on it.
         accelerations: Accelerations, jerk and process speeds.
         loads: Load of each robot.
+        forces: Torques by processes and weights, what holders exert on the part, and grips.
         phases: All phases on the nominal time of the program; times of this report count from the begin of its own.
         idle: Names of the robots that stand at their homes all the time.
         phase: Name of the phase that it is for; None for the only one of a program.
@@ -320,6 +322,7 @@ class Report(Presented):
     standoffs: tuple[Standoff, ...] = ()
     accelerations: MotionAccelerations = UNKNOWN_ACCELERATIONS
     loads: tuple[LoadUse, ...] = ()
+    forces: ForceReport = NO_FORCES
     phases: tuple[Phase, ...] = ()
     idle: tuple[str, ...] = ()
     phase: str | None = None

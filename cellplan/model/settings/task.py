@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, Tag, model_validator
 
 from cellplan.model.settings.entry import Entry, SlidingSpeed, by_kind, rule, setting
+from cellplan.model.settings.forces import ProcessForceEntry
 from cellplan.model.settings.runs import RunsEntry
 from cellplan.model.settings.units import Deg, Mm, MmPerS, Within
 
@@ -162,6 +163,11 @@ class ProcessEntry(RunsEntry):
     )
     ramp_mm: Annotated[Mm, Within(gt=0.0, le=10_000.0)] | None = setting(
         None, "Length of path on which it does, in place of ramp_s: all motion then scales with the feed."
+    )
+    force: ProcessForceEntry | None = setting(
+        None,
+        "Force and moment that the process exerts on the tool while it is on, not on rapids and runs; absent: not "
+        "stated.",
     )
 
     @property

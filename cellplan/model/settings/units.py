@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, Self
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.units import MM, joint_unit
+from cellplan.model.units import DEG, MM, joint_unit
 
 if TYPE_CHECKING:  # robots are read by processes of their own, without schemas of files
     from pydantic import GetCoreSchemaHandler
@@ -81,6 +81,24 @@ class InSi(Quantity):
     def si(self) -> float:
         """The number itself."""
         return float(self)
+
+
+class NPerMm(Quantity):
+    """Newtons per millimetre."""
+
+    @property
+    def si(self) -> float:
+        """The quantity in [N/m]."""
+        return self * MM
+
+
+class NmPerDeg(Quantity):
+    """Newton metres per degree."""
+
+    @property
+    def si(self) -> float:
+        """The quantity in [N m/rad]."""
+        return self * DEG
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

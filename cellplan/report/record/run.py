@@ -31,6 +31,7 @@ from cellplan.report.record.sections.clearance import (
     contacts_record,
     left_out_record,
 )
+from cellplan.report.record.sections.forces import ForcesRecord, forces_record
 from cellplan.report.record.sections.joints import (
     JointRecord,
     LockedJointRecord,
@@ -90,6 +91,7 @@ class HeadRecord(OriginRecord, BeginRecord):
     figures: Annotated[FiguresRecord, "by phase, quantity and subject: what was measured, in the unit of the quantity"]
     required_clearance_mm: Annotated[Number, "`checks.clearance_mm` of the cell"]
     accelerations: Annotated[AccelerationsRecord, "accelerations in the world"]
+    forces: Annotated[ForcesRecord, "static forces by processes, weights and errors of closure"]
     not_in_program: Annotated[list[str], "moves that the program does not contain"]
     base_reactions: Annotated[
         dict[str, BaseReactionRecord], "by robot whose masses are stated: what its base must hold"
@@ -185,6 +187,7 @@ def run_record(phase: ReportedPhase, *, provenance: Provenance, planning: Planni
         "closure": closures_record(report, cell),
         "solver": solver_record(cell.solver, planning),
         "accelerations": accelerations_record(report.accelerations),
+        "forces": forces_record(report.forces),
         **skew_record(report),
         **stops_record(report),
     }

@@ -116,6 +116,7 @@ def _whole(
         "caution": CAUTION,
         "solver": solver_record(cell.solver, PlanningFacts(transfers=transfers, moved=moved)),
         "accelerations": worst["accelerations"] | {"not_judged": _not_judged(records.values())},
+        "forces": worst["forces"],
         "cycles": cell.program.cycles if cell.program.is_home_to_home else None,
     }
 
@@ -128,6 +129,7 @@ def _merged(record: RunRecord, cell: Cell) -> Record:
         "closure": {robot: without_means(closure) for robot, closure in record["closure"].items()},
         "clearance": record["clearance"],
         "accelerations": record["accelerations"],
+        "forces": record["forces"],
         "payload": record["rests_on"]["payload"],
         "base_reactions": record["base_reactions"],
     }
@@ -187,6 +189,13 @@ FIGURES: Final = (
     *(Figure(f"{key}_n", max, f"{key}_at_s") for key in ("vertical", "horizontal")),
     *(Figure(f"{key}_nm", max, f"{key}_at_s") for key in ("tilting", "turning", "tilting_at_rest")),
     Figure("weight_n", max, ""),
+    Figure("torque", max, "torque_at_s"),
+    Figure("by_process", max, "by_process_at_s"),
+    Figure("by_weight", max, "by_weight_at_s"),
+    Figure("by_closure", max, ""),
+    Figure("force_n", max, "force_at_s"),
+    Figure("share", max, "share_at_s", ("tangential_n", "torsion_nm", "normal_n")),
+    Figure("across_nm", max, ""),
 )
 
 

@@ -15,6 +15,7 @@ from cellplan.report.record.numbers import fixed, floored, percent, plain, secon
 from cellplan.report.record.phases import instant_text
 from cellplan.report.record.sections.clearance import other_classes
 from cellplan.report.text.columns import Row, aligned
+from cellplan.report.text.forces import force_rows
 from cellplan.report.text.method import DEFAULT_METHOD, moved_start_lines, no_accurate_mode
 from cellplan.report.text.notes import accuracy_note, clock_note, grip_notes, open_surface_notes, skew_row
 
@@ -92,6 +93,7 @@ def _rows(record: Record) -> Iterator[Row]:
     yield from _closure_rows(record.get("closure", {}))
     yield from skew_row(record)
     yield from stop_rows(record)
+    yield from force_rows(record.get("forces"))
     yield from _drift_rows(record.get("repeatability", {}))
     yield from _slack_rows(record["solver"]["slack"])
 

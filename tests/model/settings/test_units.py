@@ -22,12 +22,16 @@ from cellplan.model.settings.units import (
     MmPerS2,
     MmPerS3,
     Ms,
+    NmPerDeg,
+    NPerMm,
     Quantity,
     in_si,
     si_or_none,
 )
 
 UNITS: Final = {
+    "_n_mm": NPerMm,
+    "_nm_deg": NmPerDeg,
     "_deg": Deg,
     "_deg_s": DegPerS,
     "_deg_s2": DegPerS2,

@@ -14,7 +14,7 @@ from cellplan.files.cell.rules.path_rules import build_path
 from cellplan.files.cell.rules.rules import needs_surface
 from cellplan.files.robots.rules import Given, home_configuration, start_posture
 from cellplan.files.schema import CellDocument
-from cellplan.files.schema.cell import CycleEntry, MotionEntry
+from cellplan.files.schema.cell import CycleEntry, GraspEntry, MotionEntry
 from cellplan.files.schema.messages import fields_of
 from cellplan.files.schema.robot import JointSumEntry, RobotEntry, ServiceEntry
 from cellplan.files.schema.seam import PathEntry
@@ -127,6 +127,9 @@ def build_part(
                 axes=_axis_numbers(grasp.axes),
                 depth=grasp.depth_mm.si,
                 bodies=grip_bodies(grasp.grip_bodies, grasp.robot, document.robots[grasp.robot], models[grasp.robot]),
+                stiffness=_stiffness(grasp),
+                closure_error=(grasp.closure_error_mm.si, grasp.closure_error_deg.si),
+                grip=grasp.grip,
             )
             for grasp in entry.held_by
         ),
@@ -135,6 +138,14 @@ def build_part(
         centre=None if entry.centre_mm is None else in_si(entry.centre_mm),
         accuracy=0.0 if step is None else step.deviation,
     )
+
+
+def _stiffness(entry: GraspEntry) -> tuple[float, float] | None:
+    """Stiffness of a grasp in [N/m] and [N m/rad]; None when it is not stated."""
+    if entry.stiffness_n_mm is None and entry.stiffness_nm_deg is None:
+        return None
+    force, moment = si_or_none(entry.stiffness_n_mm), si_or_none(entry.stiffness_nm_deg)
+    return force or np.inf, moment or np.inf
 
 
 def build_obstacle(name: str, entry: ObstacleEntry, read_mesh: MeshReader) -> Obstacle:

@@ -15,6 +15,7 @@ from cellplan.model.robot.payload import LoadUse
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.units import MM
 from cellplan.report.record.common import Number, number
+from cellplan.report.record.sections.forces import unstated_forces
 from cellplan.report.record.sections.payload import LoadRecord, loads_record, unjudged_loads
 
 IN_FRONT: Final = 0.005  # [m] by which a link's own body must stick out of the flange to be a tool: a disc does not
@@ -63,6 +64,7 @@ def rests_on_record(cell: Cell, loads: Sequence[LoadUse], tips: Sequence[Standof
             *(text for _, text in missing_tools(cell)),
             *unstated_bodies(cell),
             *unjudged_loads(loads),
+            *unstated_forces(cell),
             *unstated_standoffs(cell, tips),
         ],
     }
