@@ -1,6 +1,6 @@
 """Verification: all results of a run are computed here, from the joint tables that were read back."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -108,12 +108,12 @@ def verify_motion(
     (uses, joint_checks), speeds = _joints(cell, schedule.times, q), _speeds(scene, schedule.times, q)
     accelerations = motion_accelerations(cell, scene.chains, schedule, q=q, X_WP=X_WP)
     checks += [*joint_checks, *check_accelerations(cell, accelerations), *check_tool_speeds(cell, speeds)]
-    drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
+    drift = repeatability(cell, schedule, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
-    forces = force_report(cell, scene.chains, schedule, q, X_WP, closures)
-    checks += [*check_idle(cell, idle, schedule.times, q), *check_payload(loads), *check_forces(cell, forces)]
-    checks += _task_checks(scene, schedule, q, X_WP, uses if moving else ())
-    return Report(
+    checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
+    checks += _seam_checks(scene, schedule, q, X_WP)
+    checks += check_transfer_speeds(scene, schedule, uses, q) if moving else []
+    report = Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
         tasks=at_work,
@@ -133,11 +133,9 @@ def verify_motion(
         depths=depths,
         standoffs=tips,
         accelerations=accelerations,
-        loads=loads,
-        base_reactions=tuple(base_reactions(cell, scene.chains, schedule.times, q)),
-        forces=forces,
         greatest_feeds=greatest_feeds(scene, schedule, q, accuracy),
     )
+    return _with_loads(report, scene, schedule, X_WP)
 
 
 def with_clearance(
@@ -198,16 +196,25 @@ def _errors(
     return check_between_rows(scene, schedule, q, accuracy=accuracy, closures=closures)
 
 
-def _task_checks(
-    scene: Scene, schedule: Schedule, q: RobotRows, X_WP: Array, uses: Sequence[JointUse]
-) -> Iterator[Check]:
-    """Demanded feeds, what welds demand of tools, and speeds of transfer moves where joints may move."""
+def _with_loads(report: Report, scene: Scene, schedule: Schedule, X_WP: Array) -> Report:
+    """The report with what robots carry and bear, and what their bases must hold."""
+    cell, chains, times, q = scene.cell, scene.chains, report.times, report.q
+    loads = load_uses(cell, chains, times, q)
+    forces = force_report(cell, chains, schedule, q, X_WP, report.closures)
+    return replace(
+        report,
+        checks=(*report.checks, *check_payload(loads), *check_forces(cell, forces)),
+        loads=loads,
+        forces=forces,
+        base_reactions=tuple(base_reactions(cell, chains, times, q)),
+    )
+
+
+def _seam_checks(scene: Scene, schedule: Schedule, q: RobotRows, X_WP: Array) -> list[Check]:
+    """Positions of welds, arcs of tools, and distances from seams and walls."""
     cell, chains = scene.cell, scene.chains
-    yield from check_feeds(scene, schedule, q, X_WP)
-    yield from check_weld_positions(schedule, chains, q, X_WP)
-    yield from check_arcs(cell, schedule, chains, q)
-    yield from check_seam_distances(cell, schedule, chains, q, X_WP)
-    yield from check_transfer_speeds(scene, schedule, uses, q) if uses else ()
+    welds, arcs = check_weld_positions(schedule, chains, q, X_WP), check_arcs(cell, schedule, chains, q)
+    return [*welds, *arcs, *check_seam_distances(cell, schedule, chains, q, X_WP)]
 
 
 def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccuracy]) -> list[Check]:
