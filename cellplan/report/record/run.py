@@ -166,9 +166,7 @@ def run_record(phase: ReportedPhase, *, provenance: Provenance, planning: Planni
         "required_clearance_mm": number(cell.checks.clearance_mm),
         "pair_count": report.clearance.pair_count,
         "contacts": contacts_record(report.clearance),
-        "exclusions": [
-            {"pair": [first, second], "reason": reason} for first, second, reason in report.clearance.exclusions
-        ],
+        "exclusions": [{"pair": list(pair), "reason": why} for *pair, why in report.clearance.exclusions],
         "singularity": singularity_record(report.conditioning, report.times),
         "motion_share": motion_share_record(report, cell),
         "speeds": {robot: speed_record(speed) for robot, speed in report.speeds.items()},
