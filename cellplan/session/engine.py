@@ -64,7 +64,8 @@ class Engine:
         self._pending: Iterator[None] | None = None  # what is still to be found out at rest
         self._x = self._live.variables.numbers(values)
         last, shown = self._looks.get(self.shown), self._live.blocks[self.shown]
-        self._looks = {self.shown: Look.at(shown, follow(shown, self._x, None if last is None else last.motion))}
+        motion = follow(shown, self._x, None if last is None else last.motion)
+        self._looks = {self.shown: Look.at(shown, motion, last)}
         if last is None or self.shown != before or self.version >= self._advised + ADVISED_EVERY:
             self._advise()
 

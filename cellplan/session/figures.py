@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from cellplan.session.motion import LiveMotion
 
 KEYS: Final = 33  # [-] configurations of a motion at which distances are asked
 WITHIN: Final = 0.08  # [m] beyond what is demanded of them, up to which they are figures
+NEARER: Final = 0.005  # [m] by which bodies are likely to come nearer from one change to the next
 TOUCHING: Final = 1e-9  # [m] bodies of which less is demanded may touch
 DEPTH_TOL: Final = 1e-6  # [m] by which what is held or stands may be deeper than allowed: rounding
 DECIMALS: Final = 4  # of figures and times
@@ -129,32 +130,67 @@ def joint_figures(cell: Cell, motion: LiveMotion, loads: Loads) -> Iterator[Figu
         yield Figure(name="cycle", value=seconds, unit="s", limit=None, is_met=True)
 
 
-def distances_of(bodies: CellDistances, motion: LiveMotion) -> Distances:
-    """Near pairs at some nodes of a motion."""
-    nodes = np.unique(np.linspace(0, len(motion.times) - 1, KEYS).round().astype(np.intp))
-    return distances_at(bodies, motion.x, motion.q, nodes, WITHIN)
+def clearance_figures(block: Block, motion: LiveMotion, spare: float = WITHIN) -> Iterator[Figure]:
+    """The smallest distance of bodies, and the greatest depth beyond what is allowed where one holds or stands.
 
-
-def clearance_figures(block: Block, motion: LiveMotion, distances: Distances) -> Iterator[Figure]:
-    """The smallest distance of bodies, and the greatest depth beyond what is allowed where one holds or stands."""
-    is_apart = distances.demands >= min(TOUCHING, float(distances.demands.max(initial=0.0)))
-    spare = distances.values - distances.demands
-    limit = MM * block.cell.checks.clearance_mm.si
-    rows = np.flatnonzero(is_apart)
-    if not len(rows):
+    Args:
+        block: The block.
+        motion: Its motion; distances are those at some of its nodes.
+        spare: About what the smallest distance is beyond what is demanded, in [m]; one that is near makes it quicker.
+    """
+    least = min(TOUCHING, block.bodies.most_demanded)
+    for within in sorted({min(max(spare + NEARER, 0.0), WITHIN), WITHIN}):
+        nearest, deepest = _least(_distances(block.bodies, motion, within), least)
+        if nearest is not None and nearest.spare <= within:
+            break
+    if nearest is None:
+        limit = MM * block.cell.checks.clearance_mm.si
         yield Figure(name="clearance", value=None, unit="mm", limit=limit, is_met=True)
     else:
-        row = int(rows[np.argmin(spare[rows])])
-        names, at = _pair(block, distances, row), float(motion.times[distances.nodes[row]])
-        value, limit = MM * float(distances.values[row]), MM * float(distances.demands[row])
-        is_met = bool(spare[row] >= 0.0)
-        yield Figure(name="clearance", value=value, unit="mm", limit=limit, is_met=is_met, binds=names, at=at)
-    deep = np.flatnonzero(~is_apart & (spare < -DEPTH_TOL))
-    if len(deep):
-        row = int(deep[np.argmin(spare[deep])])
-        names, at = _pair(block, distances, row), float(motion.times[distances.nodes[row]])
-        value, limit = -MM * float(distances.values[row]), -MM * float(distances.demands[row])
-        yield Figure(name="depth", value=value, unit="mm", limit=limit, is_met=False, binds=names, at=at)
+        yield _of_pair("clearance", block, motion, nearest)
+    if deepest is not None and deepest.spare < -DEPTH_TOL:
+        yield _of_pair("depth", block, motion, deepest)
+
+
+class _Least(NamedTuple):
+    """The pair of bodies that comes nearest to what is demanded of it."""
+
+    distances: Distances
+    row: int  # its place among them
+
+    @property
+    def spare(self) -> float:
+        """Distance in [m] beyond what is demanded."""
+        return float(self.distances.values[self.row] - self.distances.demands[self.row])
+
+
+def _distances(bodies: CellDistances, motion: LiveMotion, within: float) -> Distances:
+    """Near pairs at some nodes of a motion."""
+    nodes = np.unique(np.linspace(0, len(motion.times) - 1, KEYS).round().astype(np.intp))
+    return distances_at(bodies, motion.x, motion.q, nodes, within)
+
+
+def _least(distances: Distances, least: float) -> tuple[_Least | None, _Least | None]:
+    """The pair nearest to its demand of those that must be so far apart in [m], and that of the others."""
+    spare, is_apart = distances.values - distances.demands, distances.demands >= least
+    rows = (np.flatnonzero(which) for which in (is_apart, ~is_apart))
+    first, second = (_Least(distances, int(some[np.argmin(spare[some])])) if len(some) else None for some in rows)
+    return first, second
+
+
+def _of_pair(name: str, block: Block, motion: LiveMotion, least: _Least) -> Figure:
+    """Distance of two bodies, or how deep they are in each other."""
+    distances, row = least.distances, least.row
+    scale = MM if name == "clearance" else -MM
+    return Figure(
+        name=name,
+        value=scale * float(distances.values[row]),
+        unit="mm",
+        limit=scale * float(distances.demands[row]),
+        is_met=least.spare >= 0.0,
+        binds=" - ".join(block.bodies.pairs[int(distances.pairs[row])].names),
+        at=float(motion.times[distances.nodes[row]]),
+    )
 
 
 def _highest(values: Array, which: Flags) -> tuple[int, int]:
@@ -165,7 +201,3 @@ def _highest(values: Array, which: Flags) -> tuple[int, int]:
 
 def _joint(cell: Cell, column: int) -> str:
     return "/".join(joint_at(cell, column))
-
-
-def _pair(block: Block, distances: Distances, row: int) -> str:
-    return " - ".join(block.bodies.pairs[int(distances.pairs[row])].names)
