@@ -44,7 +44,7 @@ class Drag:
     live: str  # state that the session ends in
     solved: str  # passed, failed or refused
     certified: str  # passed or failed by certifying it; empty where that was not asked
-    worst: str  # what fails worst; empty where nothing does
+    worst: str  # what the session says, and what fails worst in a solve
     is_agreed: bool
     is_small: bool  # whether what fails is within what may be overlooked
     change_s: float  # processor time of the median change
@@ -85,9 +85,8 @@ def _compared(session: Session, name: str, robot: str, change_s: float) -> Drag:
         if more is None:
             break
         answer = more
-    solved, failed = _solved(session)
+    solved, words, failed = _solved(session)
     live_passes = {answer["state"], *(block["state"] for block in answer["strip"])} <= PASSES
-    worst = max(failed, key=_excess, default=None)
     said = next((it for it in answer["strip"] if it["state"] not in PASSES), {"name": "", "text": answer["verdict"]})
     return Drag(
         cell=name,
@@ -95,7 +94,7 @@ def _compared(session: Session, name: str, robot: str, change_s: float) -> Drag:
         live=answer["state"] if live_passes or answer["state"] not in PASSES else f"{said['name']}: {said['state']}",
         solved=solved,
         certified="",
-        worst=f"{said['text']} / {'' if worst is None else worst.message}",
+        worst=f"{said['text']} / {words}",
         is_agreed=live_passes == (solved == "passed"),
         is_small=not live_passes or (solved != "refused" and all(_excess(check) <= 1.0 for check in failed)),
         change_s=change_s,
@@ -105,15 +104,15 @@ def _compared(session: Session, name: str, robot: str, change_s: float) -> Drag:
     )
 
 
-def _solved(session: Session) -> tuple[str, list[Check]]:
-    """What ``solve`` says of the cell as it would be saved."""
+def _solved(session: Session) -> tuple[str, str, list[Check]]:
+    """What ``solve`` says of the cell as it would be saved, in short and in words, and the checks that fail."""
     try:
         solution = solve(session.document.cell, is_reported=False)
-    except CellplanError:
-        return "refused", []
-    return ("passed" if solution.passed else "failed"), [
-        check for run in solution.runs for check in run.report.checks if not check.passed
-    ]
+    except CellplanError as error:
+        return "refused", str(error).splitlines()[0], []
+    failed = [check for run in solution.runs for check in run.report.checks if not check.passed]
+    words = max(failed, key=_excess).message if failed else ""
+    return ("passed" if solution.passed else "failed"), words, failed
 
 
 def _certified(session: Session) -> str:

@@ -1,5 +1,6 @@
 """Advice: for each base the step that helps most by the exact derivatives, and what it would do."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
@@ -25,14 +26,16 @@ SHOWN: Final = (("margin_deg", "deg margin"), ("clearance_mm", "mm clearance"), 
 LEAST: Final = {"margin_deg": 0.01, "clearance_mm": 0.01, "cycle_s": 0.001}  # what is not worth saying
 
 
-def advice(look: Look, variables: LiveVariables) -> list[Record]:
+def advice(look: Look, variables: LiveVariables) -> Iterator[list[Record] | None]:
     """An arrow for each base that may move: towards what is missed, else towards a shorter cycle.
 
-    Empty for a motion that the kernel does not have, or that breaks off.
+    They come last, after None for each bounded piece of the work. There are none for a motion that the kernel does not
+    have, or that breaks off.
     """
     problem, motion = look.block.problem, look.motion
     if problem is None or not motion.is_followed or motion.is_planned:
-        return []
+        yield []
+        return
     is_missed = any(not figure.is_met for figure in look.figures)
     span, times = float(motion.times[-1] - motion.times[0]), [it.at for it in look.figures if it.at is not None]
     demands = Demands(
@@ -41,7 +44,9 @@ def advice(look: Look, variables: LiveVariables) -> list[Record]:
         duration=span if is_missed else None,
     )
     standing = standing_of(problem, motion.point(), demands, Effort(also_at=tuple(times)))
+    yield None
     linear = Linear.of(problem, standing.measures)
+    yield None
     program = LinearProgram.of(linear, demands, Effort().reserve, TRUST if is_missed else SMALL)
     by_variable = {key: _finite(values) for key, values in effects(standing, np.ones(len(motion.x)), linear).items()}
     records = list[Record]()
@@ -55,7 +60,8 @@ def advice(look: Look, variables: LiveVariables) -> list[Record]:
                 direction[variables.layout.tied.ranges[column].index] = dx[column] / length
             gains = {key: float(values @ dx) for key, values in by_variable.items()}
             records.append(_record(robot, direction, MM * length, gains))
-    return records
+        yield None
+    yield records
 
 
 def _columns(variables: LiveVariables, robot: str) -> list[int]:

@@ -48,6 +48,15 @@ class Changes:
         self._undone.clear()
         self._is_open = True
 
+    def add(self, values: Mapping[str, object]) -> None:
+        """Set values that follow from the last step, as a part of it; nothing where there is none."""
+        new = {address: value for address, value in plain_values(values).items() if value != self.value(address)}
+        if new and self._done:
+            step = self._done[-1]
+            olds = {address: step[address][0] if address in step else self.value(address) for address in new}
+            self._done[-1] = {**step, **{address: (olds[address], value) for address, value in new.items()}}
+            self._put(new)
+
     def complete(self) -> None:
         """Complete the last step, such as a drag: what follows is another one."""
         self._is_open = False

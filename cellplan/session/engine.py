@@ -47,7 +47,8 @@ class Engine:
         self._bodies = {body.name: body.X_BS for body in self.given.scene.bodies}
         self._obstacles, self.version = dict[str, float](), version
         self._looks = dict[int, Look]()
-        self._advice, self._advised = list[Record](), 0
+        self._advice, self._advised = list[Record](), -ADVISED_EVERY
+        self._advising: Iterator[None] = iter(())
         self.move({})
 
     def move(self, values: Mapping[str, float], block: int | None = None) -> None:
@@ -66,8 +67,16 @@ class Engine:
         last, shown = self._looks.get(self.shown), self._live.blocks[self.shown]
         motion = follow(shown, self._x, None if last is None else last.motion)
         self._looks = {self.shown: Look.at(shown, motion, last)}
-        if last is None or self.shown != before or self.version >= self._advised + ADVISED_EVERY:
-            self._advise()
+        if last is None or self.shown != before:  # arrows are those of another block
+            self._advice, self._advised, self._advising = [], -ADVISED_EVERY, iter(())
+
+    def advise(self) -> bool:
+        """Find out more of what would help, a bounded piece of work; False for nothing until some changes later."""
+        if next(self._advising, True) is None:
+            return True
+        if is_due := self.version >= self._advised + ADVISED_EVERY:
+            self._advising = self._advise()
+        return is_due
 
     def restore(self, cell: Cell) -> None:
         """Work out the shown block at the values of a changed cell, whose robots begin as it says."""
@@ -86,14 +95,21 @@ class Engine:
         self.given, self._live = _begun(starts, self.given, self._live)
 
     def starts(self) -> dict[str, object]:
-        """Where robots begin in the shown block, by address; as the file says where nothing else was changed."""
-        look, cell = self._looks[self.shown], self.given.cell
-        if not look.motion.is_begun:
-            return {}
-        written = written_starts(cell, look.block, look.motion.q[0])
+        """Where robots begin in the blocks that are known, by address; as the file says where nothing was changed."""
+        cell, written = self.given.cell, dict[str, object]()
+        for look in self._looks.values():
+            if look.motion.is_begun:
+                written |= written_starts(cell, look.block, look.motion.q[0])
         listed = self.given.variables.listed
         is_given = all(self.values.get(it.address, it.given) == it.given for it in listed)
         return as_given(cell, written) if is_given else written
+
+    def look_at_others(self) -> Iterator[None]:
+        """Work out the blocks that are not shown, one after the other."""
+        for place, block in enumerate(self._live.blocks):
+            if place not in self._looks:
+                self._looks[place] = Look.at(block, follow(block, self._x))
+                yield None
 
     def settle(self, cell: Cell) -> bool:
         """Find out more of what is asked at rest, a bounded piece of work; False once there is nothing left to do.
@@ -115,25 +131,25 @@ class Engine:
     def _settling(self, cell: Cell) -> Iterator[None]:
         """Piece by piece: what would help, the other blocks, the judgement of the shown one."""
         look = self._looks[self.shown]
-        self._advise()
+        exhausted(self._advise())
         yield None
-        for place, block in enumerate(self._live.blocks):
-            if place not in self._looks:
-                self._looks[place] = Look.at(block, follow(block, self._x))
-                yield None
+        yield from self.look_at_others()
         begun = started(cell, look.motion.q[0]) if look.motion.is_begun else cell
         for judgement in judged(begun, look.block, self.given.scene):
             if not look.motion.is_followed and len(judgement.q):
                 look = Look.at(look.block, of_rows(self._x, judgement.times, judgement.q))
             look = self._looks[self.shown] = look.judged(judgement)
             yield None
-        self._advise()
+        exhausted(self._advise())
         self._is_settled = True
         yield None
 
-    def _advise(self) -> None:
-        """Say what would help the shown block as it is now."""
-        self._advice, self._advised = advice(self._looks[self.shown], self._live.variables), self.version
+    def _advise(self) -> Iterator[None]:
+        """Say what would help the shown block as it is now, piece by piece."""
+        self._advised = self.version
+        for found in advice(self._looks[self.shown], self._live.variables):
+            self._advice = self._advice if found is None else found
+            yield None
 
     def record(self) -> Record:
         """What is known of the present values."""
@@ -166,6 +182,12 @@ class Engine:
             cell = self.given.cell.with_values(values) if values else self.given.cell
             self._live = self.given.on(cell, placed_scene(self.given.scene, cell))
             self._obstacles = {**values}
+
+
+def exhausted(pieces: Iterator[None]) -> None:
+    """Do all pieces of some work."""
+    for _ in pieces:
+        pass
 
 
 def _begun(starts: Mapping[int, Array], *cells: LiveCell) -> Iterator[LiveCell]:

@@ -17,6 +17,7 @@ from cellplan.search.programs.problem import Point
 from cellplan.session.blocks import Block
 
 ROWS: Final = 400  # [-] of a motion that is planned anew for an answer, where the steps of its cell are finer
+PASSED: Final = 1e-5  # [rad] and [m] that the last pass of the kernel may still change
 APART: Final = 1e-6  # [rad] or [m] between two starts that are the same
 FACTORS: Final = (50, 40, 25, 20, 16, 10, 8, 5, 4, 2)  # [-] times as long steps, the longest first
 
@@ -57,9 +58,11 @@ def follow(block: Block, x: Array, near: LiveMotion | None = None) -> LiveMotion
     starts = [block.start]
     if near is not None and near.is_begun and np.abs(near.q[0] - block.start).max() > APART:
         starts.append(near.q[0])
+    if block.problem is not None:
+        return _by_kernel(block.problem, x, np.array(starts), near)
     best: LiveMotion | None = None
     for start in starts:
-        motion = _planned(block, x, start) if block.problem is None else _by_kernel(block.problem, x, start, near)
+        motion = _planned(block, x, start)
         if motion.is_followed:
             return motion
         if best is None or (motion.lost_at or 0.0) > (best.lost_at or 0.0):
@@ -67,19 +70,25 @@ def follow(block: Block, x: Array, near: LiveMotion | None = None) -> LiveMotion
     return best or motion
 
 
-def _by_kernel(problem: LayoutProblem, x: Array, start: Array, near: LiveMotion | None) -> LiveMotion:
-    """The motion at the nodes of the kernel."""
-    job, layouts = problem.job, problem.variables.layouts(x[None], start[None])
+def _by_kernel(problem: LayoutProblem, x: Array, starts: Array, near: LiveMotion | None) -> LiveMotion:
+    """The motion at the nodes of the kernel, from the first of some starts that leads farthest, shape (K, nq)."""
+    job, layouts = problem.job, problem.variables.layouts(np.tile(x, (len(starts), 1)), starts)
+    first = layouts.of_places(slice(1))
     is_near = near is not None and near.is_followed and len(near.q) == len(job.times)
-    motions = run_near(job, layouts, near.q[None]) if near is not None and is_near else run(job, layouts)
-    if not is_near and motions.is_followed[0]:  # the integral of the passes, whatever a motion came from
-        motions = run_near(job, layouts, motions.q)
+    motions = run_near(job, first, near.q[None], accuracy=PASSED) if near is not None and is_near else None
+    if motions is None or not motions.is_followed[0]:
+        several = run(job, layouts)
+        best = int(np.argmax(several.lost_at))
+        first = layouts.of_places(slice(best, best + 1))
+        motions = Motions(q=several.q[[best]], qd=several.qd[[best]], lost_at=several.lost_at[[best]])
+        if motions.is_followed[0]:  # the integral of the passes, whatever a motion came from
+            motions = run_near(job, first, motions.q, accuracy=PASSED)
     q, qd, lost_at = _followed(motions, job.times)
     count = len(q)
     rates = job.rates[:count, :count] if count == len(job.times) else np.zeros((count, count))
     is_begun = bool(np.isfinite(lost_at) or np.isposinf(lost_at))
     if not is_begun:
-        q, qd = layouts.start[:1], np.zeros_like(layouts.start[:1])
+        q, qd = first.start, np.zeros_like(first.start)
     return LiveMotion(
         x=x,
         times=job.times[:count],

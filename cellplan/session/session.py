@@ -11,8 +11,9 @@ from cellplan.scene.scene import Scene
 from cellplan.session.actions import Actions
 from cellplan.session.answer import CERTIFIED, FAILS, PLANNED
 from cellplan.session.document import Document
-from cellplan.session.engine import Engine
-from cellplan.session.starts import ADDRESS
+from cellplan.session.engine import Engine, exhausted
+from cellplan.session.starts import ADDRESS, unstated
+from cellplan.session.work import KINDS
 
 SCHEMA: Final = "cellplan.edit/1"
 
@@ -84,6 +85,13 @@ class Session:
         """Put the base of a robot elsewhere: ``session.move("kuka", x_mm=900)``; see ``change``."""
         return self.change({f"robots.{robot}.base.{key}": value for key, value in components.items()})
 
+    def advise(self) -> bool:
+        """Find out what would help between two changes, a bounded piece of work; False where there is nothing to do.
+
+        It stands in later answers. Without this it is found out at rest.
+        """
+        return self._engine.advise()
+
     def settle(self) -> Record | None:
         """A fuller answer, a bounded piece of work at a time; None once there is nothing left to do."""
         self.document.changes.complete()
@@ -91,7 +99,9 @@ class Session:
             cell = self.document.cell
         except InputError as error:
             return self.answer() if self._engine.refuse(error) else None
-        return self.answer() if self._engine.settle(cell) else None
+        is_more = self._engine.settle(cell)
+        self._write_starts()
+        return self.answer() if is_more else None
 
     def do(self, action: str, argument: float | None = None) -> Record:
         """Do something else than a change, and say what becomes of the block that is shown.
@@ -105,6 +115,9 @@ class Session:
             InputError: There is no such action, or it is refused.
         """
         document, changes, actions = self.document, self.document.changes, self._actions
+        if action in {"save", *KINDS}:
+            exhausted(self._engine.look_at_others())
+            self._write_starts()
         values: dict[str, Callable[[], Record | None]] = {
             "undo": changes.undo,
             "redo": changes.redo,
@@ -156,6 +169,10 @@ class Session:
             "history": document.history,
             "is_saved": not document.history,
         }
+
+    def _write_starts(self) -> None:
+        """Let robots begin as the blocks that are known have them, as a base moves below all of its tasks."""
+        self.document.changes.add(unstated(self.document.cell, self._engine.starts()))
 
     def close(self) -> None:
         """End what works in the background."""

@@ -13,6 +13,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.search.variables.written import written_start, written_task_start
 from cellplan.session.blocks import Block
 
+ROUNDED: Final = 1e-5  # [deg] or [mm] by which a start that is written may be off
 ADDRESS: Final = re.compile(r"(robots|tasks)\.[^.\[]+\.start(_deg)?")  # of a start posture as a whole
 
 
@@ -41,6 +42,23 @@ def written_starts(cell: Cell, block: Block, start: Array) -> dict[str, object]:
 def as_given(cell: Cell, values: Mapping[str, object]) -> dict[str, object]:
     """What the file says at the same addresses."""
     return {address: written_at(cell.origin.document, address) for address in values}
+
+
+def unstated(cell: Cell, values: Mapping[str, object]) -> dict[str, object]:
+    """Those of some starts by address that a cell does not state already, up to rounding."""
+    document = cell.origin.document
+    return {address: value for address, value in values.items() if not _is_same(value, written_at(document, address))}
+
+
+def _is_same(value: object, stated: object) -> bool:
+    """Whether two start postures are the same."""
+    if isinstance(value, Mapping) and isinstance(stated, Mapping):
+        return value.keys() == stated.keys() and all(_is_same(it, stated[key]) for key, it in value.items())
+    if isinstance(value, list | tuple) and isinstance(stated, list | tuple):
+        return len(value) == len(stated) and all(map(_is_same, value, stated))
+    if isinstance(value, int | float) and isinstance(stated, int | float):
+        return abs(value - stated) <= ROUNDED
+    return value == stated
 
 
 def stated_start(cell: Cell, block: Block) -> Array:

@@ -26,6 +26,7 @@ class TwoNumbers:
         self.calls: list[tuple[str, Any]] = []
         self.events: list[Record] = []
         self.version, self.is_settled = 0, True
+        self.pieces = 0  # of what would help, that are left
         self.may_change = threading.Event()  # lets a change wait, as a long computation would
         self.may_change.set()
 
@@ -52,6 +53,10 @@ class TwoNumbers:
         self.values |= values
         self.version, self.is_settled = self.version + 1, False
         return self.answer(number)
+
+    def advise(self) -> bool:
+        self.pieces -= 1
+        return self.pieces >= 0
 
     def settle(self) -> Record | None:
         if self.is_settled:

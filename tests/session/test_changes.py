@@ -61,6 +61,25 @@ def test_a_drag_is_one_step_until_it_is_complete() -> None:
     assert changes.values == {}
 
 
+def test_what_follows_from_a_step_is_undone_and_done_again_with_it() -> None:
+    changes = Changes(PAIR)
+    changes.add({YAW: 185})
+    assert changes.values == {}
+
+    changes.set({X: 2001})
+    changes.set({X: 2002})
+    changes.complete()
+    changes.add({YAW: 181, X: 2003})
+    changes.add({YAW: 182})
+    after = changes.values
+
+    assert after == {X: 2003, YAW: 182}
+    changes.undo()
+    assert changes.values == {}
+    changes.redo()
+    assert changes.values == after
+
+
 def test_a_new_change_ends_what_could_be_done_again() -> None:
     changes = Changes(PAIR)
     changes.set({X: 2001})

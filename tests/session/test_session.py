@@ -188,6 +188,21 @@ def test_arrow_tells_what_a_step_does() -> None:
     assert figure(moved, "margin")["value"] - before == pytest.approx(said, rel=0.05)
 
 
+def test_arrows_are_worked_out_between_changes_once_in_a_while(pair: Session) -> None:
+    settled(pair)
+    arrows = []
+    for step in range(25):
+        answer = pair.move("right", x_mm=1830 + step)
+        arrows.append(json.dumps(answer["advice"]))
+        while pair.advise():
+            pass
+
+    assert arrows[0] != "[]"
+    assert len(set(arrows)) == 2
+    pair.do("reset")
+    assert json.dumps(settled(pair)["advice"]) == arrows[0]
+
+
 @pytest.mark.slow
 def test_program_shows_all_blocks() -> None:
     session = edit(CELLS / "in_turn.yaml")
@@ -197,6 +212,25 @@ def test_program_shows_all_blocks() -> None:
     assert [it["state"] for it in answer["strip"]] == ["planned"] * 3
     answer = session.change({}, block=2)
     assert answer["block"] == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("action", ["settle", "save"])
+def test_base_that_is_moved_takes_the_starts_of_all_its_tasks_along(tmp_path: Path, action: str) -> None:
+    path = tmp_path / "cell.yaml"
+    path.write_text((CELLS / "in_turn.yaml").read_text())
+    session = edit(path)
+    session.move("abb", x_mm=2200, y_mm=60)  # at work in the second block, the first one is shown
+    settled(session) if action == "settle" else session.do("save")
+
+    cell = session.document.cell
+    assert solve(cell).passed
+    if action == "settle":
+        settings = session.document.settings
+        assert settled(session)["history"] == [f"--set '{it}'" if "[" in it else f"--set {it}" for it in settings]
+        session.do("undo")
+        settled(session)
+        assert session.document.settings == []
 
 
 @pytest.mark.slow

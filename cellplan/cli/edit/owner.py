@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cellplan.report.record.common import Record
 
 QUIET_S: Final = 0.15  # [s] without a change after which the session settles
+SENT_S: Final = 0.003  # [s] after which an answer is sent: until then nothing else is done
 POLL_S: Final = 0.05  # [s] between two polls of worker processes and of the file
 
 Publish = Callable[[bytes, int | None], None]  # called with one event as JSON, and the tab that has it already
@@ -30,6 +31,9 @@ class LiveSession(Protocol):
 
     def change(self, values: Mapping[str, float], *, block: int | None = None, number: int = 0) -> "Record":
         """The answer to new values."""
+
+    def advise(self) -> bool:
+        """A piece of what would help, between two changes; False if there is nothing left to do."""
 
     def settle(self) -> "Record | None":
         """A fuller answer, once nothing changes; None if there is nothing left to do."""
@@ -57,7 +61,7 @@ class Owner:
         self._jobs: deque[Job] = deque()
         self._arrived = threading.Condition()
         self._has_ended = False
-        self._is_settled = False
+        self._is_settled, self._is_advised = False, True
         self._changed_at = self._polled_at = time.monotonic()
         self._failure = ""  # that was published last
 
@@ -83,6 +87,8 @@ class Owner:
             job = self._next()
             if job is not None:
                 job.reply.set_result(self._replied(job))
+            elif not self._is_advised:
+                self._advise()
             elif not self._is_settled and time.monotonic() - self._changed_at >= QUIET_S:
                 self._settle()
             if time.monotonic() - self._polled_at >= POLL_S:
@@ -103,7 +109,8 @@ class Owner:
         with self._arrived:
             if not self._jobs:
                 now = time.monotonic()
-                due = self._polled_at + POLL_S if self._is_settled else self._changed_at + QUIET_S
+                quiet = QUIET_S if self._is_advised else SENT_S
+                due = self._polled_at + POLL_S if self._is_settled else self._changed_at + quiet
                 self._arrived.wait(max(0.0, min(due, self._polled_at + POLL_S) - now))
             return self._jobs.popleft() if self._jobs else None
 
@@ -139,12 +146,20 @@ class Owner:
 
     def _note(self, record: "Record", text: bytes, tab: int | None) -> None:
         """Publish an answer or an event, and settle again later."""
-        self._is_settled, self._changed_at = False, time.monotonic()
+        self._is_settled, self._is_advised, self._changed_at = False, False, time.monotonic()
         if "event" in record:
             self._publish(text, tab)
         else:
             self.answer = record
             self._publish(ANSWER + b',"answer":' + text + b"}", tab)
+
+    def _advise(self) -> None:
+        """One piece of what would help."""
+        try:
+            self._is_advised = not self._session.advise()
+        except Exception as error:  # noqa: BLE001 - likewise
+            self._is_advised = True
+            self._fail("advise", error)
 
     def _settle(self) -> None:
         """One piece of what follows when nothing changes."""

@@ -27,7 +27,7 @@ AT_ONCE: Final = 256  # candidates side by side: enough for NumPy, and the array
 START_TOL: Final = 1e-6  # [m] and [rad] up to which a tool counts as at the start of its path
 LOST: Final = 0.05  # [m] or [rad] beside its path a predicted tool has lost it: Newton's step is no small one any more
 MOST_PASSES: Final = 20  # over all nodes
-PASSED: Final = 1e-7  # [rad] and [m] that a pass may still change
+PASSED: Final = 1e-7  # [rad] and [m] that the last pass may still change
 
 
 @cache
@@ -100,6 +100,9 @@ class _March:
                 q[node], qd[node], errors = self._corrected(node, at)
             is_on_path = (errors <= LOST) & np.isfinite(q[node] + qd[node]).all(axis=0)
             lost_at[~is_on_path & np.isposinf(lost_at)] = times[node]
+            if not np.isposinf(lost_at).any():
+                q[node + 1 :], qd[node + 1 :] = np.nan, np.nan
+                break
             if node + 1 < len(times):
                 at = q[node] + sum(
                     weight * qd[node - back] for back, weight in enumerate(job.steps[node].tolist()) if weight
@@ -121,7 +124,7 @@ class _March:
         return repeated((self._job.X[..., node : node + 1], self._job.V[..., node : node + 1]), self._count)
 
 
-def run_near(job: Job, layouts: Layouts, q: Array, rates: Array | None = None) -> Motions:
+def run_near(job: Job, layouts: Layouts, q: Array, rates: Array | None = None, *, accuracy: float = PASSED) -> Motions:
     """The motions of a few candidates that are known to be near given ones: all nodes at once.
 
     Picard's iteration finds the integral of the speeds, Newton's method the paths, both in one pass over all nodes; the
@@ -132,6 +135,7 @@ def run_near(job: Job, layouts: Layouts, q: Array, rates: Array | None = None) -
         q: Joint positions at the nodes that are nearly right in [rad] or [m], shape (K, N, nq).
         rates: How the joint speeds change with the joints near them, see ``MotionDerivatives``, shape (N, nq, nq); a
             few passes less are needed with them.
+        accuracy: Change of the joints in [rad] and [m] below which a pass is the last one.
     """
     keep_freed_memory()
     count, nodes, _ = q.shape
@@ -151,7 +155,7 @@ def run_near(job: Job, layouts: Layouts, q: Array, rates: Array | None = None) -
         for _ in range(MOST_PASSES):
             change, velocities, errors = passes.once(at)
             at = at + change
-            is_settled = np.abs(change).max(axis=(0, 2)) <= PASSED
+            is_settled = np.abs(change).max(axis=(0, 2)) <= accuracy
             if is_settled.all():
                 break
     return _completed(job, layouts, at, velocities, is_settled=is_settled & arrived & (errors <= LOST))

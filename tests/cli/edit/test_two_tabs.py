@@ -29,6 +29,17 @@ def test_a_change_is_seen_in_every_other_tab_and_what_settles_in_all() -> None:
     assert of_first[0]["answer"]["is_settled"]
 
 
+def test_what_would_help_is_found_out_after_an_answer_and_before_it_settles() -> None:
+    with served() as page, page.events(tab=1) as events:
+        page.session.pieces = 3
+        answer = body_of(page.post("/change", {"tab": 1, "number": 1, "values": {"x": 5.0}}))
+        event = next(events)
+
+    assert not answer["is_settled"]
+    assert event["answer"]["is_settled"]
+    assert page.session.pieces == -1
+
+
 def test_events_of_the_background_come_to_all_tabs() -> None:
     with served() as page, page.events() as first, page.events() as second:
         page.session.events = [{"event": "file", "state": "changed", "text": "saved in an editor"}]

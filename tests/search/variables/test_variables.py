@@ -89,8 +89,11 @@ def test_the_kernel_moves_as_the_written_cell(cell: Cell) -> None:
     q = motion_of(variables.base, start)
     written = variables.cell(x, q[0])
     other = motion_of(written, Layouts.of([written], start_of(written)[None]))
-    assert np.abs(q).max() > 0.1
-    assert np.abs(q - other).max() <= 5e-6  # what is written is rounded to 0.001 mm and 1e-6 deg, weights to 1e-6
+    done = np.isfinite(q).all(axis=1)  # up to where a tool loses its path
+    assert done.sum() > 10
+    assert np.abs(q[done]).max() > 0.1
+    np.testing.assert_array_equal(done, np.isfinite(other).all(axis=1))
+    assert np.abs(q - other)[done].max() <= 5e-6  # what is written is rounded to 0.001 mm and 1e-6 deg, weights to 1e-6
 
 
 def test_what_is_written_is_read_again(cell: Cell) -> None:
