@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from cellplan.search.programs.rows import Linear
 from cellplan.session.answer import Look
 from cellplan.session.variables import LiveVariables
 
+EVERY: Final = 20  # [-] changes: between them the advice is that of a layout close by
 TRUST: Final = 2.0  # [-] usual steps of 0.1 m that an arrow is long at most where something is missed
 SMALL: Final = 0.2  # [-] likewise where nothing is
 SHORTEST: Final = 1e-3  # [m] of an arrow
@@ -26,7 +27,43 @@ SHOWN: Final = (("margin_deg", "deg margin"), ("clearance_mm", "mm clearance"), 
 LEAST: Final = {"margin_deg": 0.01, "clearance_mm": 0.01, "cycle_s": 0.001}  # what is not worth saying
 
 
-def advice(look: Look, variables: LiveVariables) -> Iterator[list[Record] | None]:
+class Advice:
+    """What would help a block, of a layout that is not many changes old.
+
+    Attributes:
+        records: An arrow for each base that may move; empty until they are known.
+    """
+
+    def __init__(self) -> None:
+        """Begin without any."""
+        self.records, self._version = list[Record](), -EVERY
+        self._pieces: Iterator[list[Record] | None] = iter(())
+
+    @classmethod
+    def of(cls, look: Look, variables: LiveVariables, version: int) -> Self:
+        """Advice of a present layout; see ``go_on``."""
+        advice = cls()
+        while advice.go_on(look, variables, version):
+            pass
+        return advice
+
+    def go_on(self, look: Look, variables: LiveVariables, version: int) -> bool:
+        """A bounded piece of work; False where there is nothing to do until some changes later.
+
+        Args:
+            look: The block as it is now.
+            variables: What may be changed.
+            version: How often it was changed.
+        """
+        for found in self._pieces:
+            self.records = self.records if found is None else found
+            return True
+        if is_due := version >= self._version + EVERY:
+            self._pieces, self._version = _found(look, variables), version
+        return is_due
+
+
+def _found(look: Look, variables: LiveVariables) -> Iterator[list[Record] | None]:
     """An arrow for each base that may move: towards what is missed, else towards a shorter cycle.
 
     They come last, after None for each bounded piece of the work. There are none for a motion that the kernel does not

@@ -75,10 +75,6 @@ class Changes:
             self._done.append(self._undone.pop())
             self._put({address: new for address, (_, new) in self._done[-1].items()})
 
-    def differ_from(self, cell: Cell) -> bool:
-        """Whether a cell has other values than these."""
-        return any(_value(cell, address) != value for address, value in self.values.items())
-
     def reset(self) -> None:
         """Set all values to those of the cell, as a step."""
         if self.values:
@@ -111,6 +107,11 @@ class Changes:
             self.values = {it: old for it, old in self.values.items() if it != address and not _is_below(it, address)}
             if value != self.value(address):
                 self.values[address] = value
+
+
+def differ(values: Mapping[str, object], cell: Cell) -> bool:
+    """Whether a cell has other values than some by address."""
+    return any(_value(cell, address) != value for address, value in values.items())
 
 
 def _value(cell: Cell, address: str) -> object:

@@ -23,7 +23,7 @@ from cellplan.files.yaml.reader import SIZE_LIMIT
 from cellplan.files.yaml.writer import flow_text
 from cellplan.model.cell.cell import Cell
 from cellplan.runs.overrides import read_settings
-from cellplan.session.changes import Changes
+from cellplan.session.changes import Changes, differ
 
 Record = dict[str, Any]
 READS: Final = 3  # times that a file is read which is saved while it is read
@@ -137,7 +137,7 @@ class Document:
 
     def _arrived(self, read: _Read, saved: Path) -> Record:
         """Go on from a file that another program has saved, or have the user decide."""
-        if read.data != self._read.data and self.changes.differ_from(read.cell):
+        if read.data != self._read.data and differ(self.changes.values, read.cell):
             return self._conflict(read, "has values that are not those here")
         try:
             self._adopt(read)

@@ -1,5 +1,6 @@
 """Engine of a session: the values of a live cell, the block that is shown, and what is known of all blocks."""
 
+from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final
@@ -14,14 +15,13 @@ from cellplan.jobs.view.geometries import Geometries
 from cellplan.jobs.view.write import page_record, placed_scene
 from cellplan.model.cell.cell import Cell
 from cellplan.report.record.common import Record
-from cellplan.session.advice import advice
+from cellplan.session.advice import Advice
 from cellplan.session.answer import Look, poses, strip_of
 from cellplan.session.blocks import LiveCell
 from cellplan.session.judge import Judgement, judged, reason
 from cellplan.session.motion import follow, of_rows
 from cellplan.session.starts import as_given, started, stated_start, written_starts
 
-ADVISED_EVERY: Final = 20  # [-] changes: between them the advice is that of a layout close by
 SAME_START: Final = 1e-3  # [rad] or [m] within which a start that is written is the one that a motion has
 
 
@@ -47,8 +47,7 @@ class Engine:
         self._bodies = {body.name: body.X_BS for body in self.given.scene.bodies}
         self._obstacles, self.version = dict[str, float](), version
         self._looks = dict[int, Look]()
-        self._advice, self._advised = list[Record](), -ADVISED_EVERY
-        self._advising: Iterator[None] = iter(())
+        self._advice = Advice()
         self.move({})
 
     def move(self, values: Mapping[str, float], block: int | None = None) -> None:
@@ -68,15 +67,11 @@ class Engine:
         motion = follow(shown, self._x, None if last is None else last.motion)
         self._looks = {self.shown: Look.at(shown, motion, last)}
         if last is None or self.shown != before:  # arrows are those of another block
-            self._advice, self._advised, self._advising = [], -ADVISED_EVERY, iter(())
+            self._advice = Advice()
 
     def advise(self) -> bool:
         """Find out more of what would help, a bounded piece of work; False for nothing until some changes later."""
-        if next(self._advising, True) is None:
-            return True
-        if is_due := self.version >= self._advised + ADVISED_EVERY:
-            self._advising = self._advise()
-        return is_due
+        return self._advice.go_on(self._looks[self.shown], self._live.variables, self.version)
 
     def restore(self, cell: Cell) -> None:
         """Work out the shown block at the values of a changed cell, whose robots begin as it says."""
@@ -94,8 +89,14 @@ class Engine:
         starts = {place: motion.q[0] for place, motion in motions.items()}
         self.given, self._live = _begun(starts, self.given, self._live)
 
-    def starts(self) -> dict[str, object]:
-        """Where robots begin in the blocks that are known, by address; as the file says where nothing was changed."""
+    def starts(self, *, of_all: bool = False) -> dict[str, object]:
+        """Where robots begin in the blocks that are known, by address; as the file says where nothing was changed.
+
+        Args:
+            of_all: Whether all blocks are to be known.
+        """
+        if of_all:
+            deque(_looked(self._live, self._x, self._looks), maxlen=0)
         cell, written = self.given.cell, dict[str, object]()
         for look in self._looks.values():
             if look.motion.is_begun:
@@ -103,13 +104,6 @@ class Engine:
         listed = self.given.variables.listed
         is_given = all(self.values.get(it.address, it.given) == it.given for it in listed)
         return as_given(cell, written) if is_given else written
-
-    def look_at_others(self) -> Iterator[None]:
-        """Work out the blocks that are not shown, one after the other."""
-        for place, block in enumerate(self._live.blocks):
-            if place not in self._looks:
-                self._looks[place] = Look.at(block, follow(block, self._x))
-                yield None
 
     def settle(self, cell: Cell) -> bool:
         """Find out more of what is asked at rest, a bounded piece of work; False once there is nothing left to do.
@@ -131,25 +125,18 @@ class Engine:
     def _settling(self, cell: Cell) -> Iterator[None]:
         """Piece by piece: what would help, the other blocks, the judgement of the shown one."""
         look = self._looks[self.shown]
-        exhausted(self._advise())
+        self._advice = Advice.of(look, self._live.variables, self.version)
         yield None
-        yield from self.look_at_others()
+        yield from _looked(self._live, self._x, self._looks)
         begun = started(cell, look.motion.q[0]) if look.motion.is_begun else cell
         for judgement in judged(begun, look.block, self.given.scene):
             if not look.motion.is_followed and len(judgement.q):
                 look = Look.at(look.block, of_rows(self._x, judgement.times, judgement.q))
             look = self._looks[self.shown] = look.judged(judgement)
             yield None
-        exhausted(self._advise())
+        self._advice = Advice.of(look, self._live.variables, self.version)
         self._is_settled = True
         yield None
-
-    def _advise(self) -> Iterator[None]:
-        """Say what would help the shown block as it is now, piece by piece."""
-        self._advised = self.version
-        for found in advice(self._looks[self.shown], self._live.variables):
-            self._advice = self._advice if found is None else found
-            yield None
 
     def record(self) -> Record:
         """What is known of the present values."""
@@ -161,7 +148,7 @@ class Engine:
             **self._looks[self.shown].record,
             "poses": poses(self._live.variables.layout.placed(self._x), self._bodies),
             "strip": strip_of(self._live.blocks, self._looks),
-            "advice": self._advice,
+            "advice": self._advice.records,
             "is_settled": self._is_settled,
         }
 
@@ -184,10 +171,12 @@ class Engine:
             self._obstacles = {**values}
 
 
-def exhausted(pieces: Iterator[None]) -> None:
-    """Do all pieces of some work."""
-    for _ in pieces:
-        pass
+def _looked(live: LiveCell, x: Array, looks: dict[int, Look]) -> Iterator[None]:
+    """Work out the blocks that are not known, one after the other."""
+    for place, block in enumerate(live.blocks):
+        if place not in looks:
+            looks[place] = Look.at(block, follow(block, x))
+            yield None
 
 
 def _begun(starts: Mapping[int, Array], *cells: LiveCell) -> Iterator[LiveCell]:

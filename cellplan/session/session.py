@@ -1,6 +1,7 @@
 """Session: a cell whose layout is changed; each change is answered with what becomes of the whole job."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -11,7 +12,7 @@ from cellplan.scene.scene import Scene
 from cellplan.session.actions import Actions
 from cellplan.session.answer import CERTIFIED, FAILS, PLANNED
 from cellplan.session.document import Document
-from cellplan.session.engine import Engine, exhausted
+from cellplan.session.engine import Engine
 from cellplan.session.starts import ADDRESS, unstated
 from cellplan.session.work import KINDS
 
@@ -35,7 +36,7 @@ def edit(cell: Path | str, *, settings: Iterable[str] = (), allow_dirs: Sequence
     return Session.open(Path(cell), settings=settings, allow_dirs=allow_dirs)
 
 
-class Session:
+class Session(AbstractContextManager["Session"]):
     """A cell file that is open. It is called from one thread, and starts none.
 
     Attributes:
@@ -100,7 +101,7 @@ class Session:
         except InputError as error:
             return self.answer() if self._engine.refuse(error) else None
         is_more = self._engine.settle(cell)
-        self._write_starts()
+        _write_starts(self.document, self._engine.starts())
         return self.answer() if is_more else None
 
     def do(self, action: str, argument: float | None = None) -> Record:
@@ -116,8 +117,7 @@ class Session:
         """
         document, changes, actions = self.document, self.document.changes, self._actions
         if action in {"save", *KINDS}:
-            exhausted(self._engine.look_at_others())
-            self._write_starts()
+            _write_starts(document, self._engine.starts(of_all=True))
         values: dict[str, Callable[[], Record | None]] = {
             "undo": changes.undo,
             "redo": changes.redo,
@@ -170,23 +170,20 @@ class Session:
             "is_saved": not document.history,
         }
 
-    def _write_starts(self) -> None:
-        """Let robots begin as the blocks that are known have them, as a base moves below all of its tasks."""
-        self.document.changes.add(unstated(self.document.cell, self._engine.starts()))
-
     def close(self) -> None:
         """End what works in the background."""
         self._actions.close()
-
-    def __enter__(self) -> Self:
-        """Begin a ``with`` statement."""
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """See ``close``."""
         self.close()
+
+
+def _write_starts(document: Document, starts: Mapping[str, object]) -> None:
+    """Let robots begin as the blocks of the live cell do, as a base moves below all of its tasks."""
+    document.changes.add(unstated(document.cell, starts))
 
 
 def _saved(document: Document, *, as_another: bool) -> Record:
