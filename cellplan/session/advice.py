@@ -55,15 +55,15 @@ class Advice:
             variables: What may be changed.
             version: How often it was changed.
         """
-        for found in self._pieces:
-            self.records = self.records if found is None else found
+        for arrows in self._pieces:
+            self.records = self.records if arrows is None else arrows
             return True
         if is_due := version >= self._version + EVERY:
-            self._pieces, self._version = _found(look, variables), version
+            self._pieces, self._version = _advised(look, variables), version
         return is_due
 
 
-def _found(look: Look, variables: LiveVariables) -> Iterator[list[Record] | None]:
+def _advised(look: Look, variables: LiveVariables) -> Iterator[list[Record] | None]:
     """An arrow for each base that may move: towards what is missed, else towards a shorter cycle.
 
     They come last, after None for each bounded piece of the work. There are none for a motion that the kernel does not

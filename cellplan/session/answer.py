@@ -42,7 +42,7 @@ class Look:
 
     @classmethod
     def at(cls, block: Block, motion: LiveMotion, near: "Look | None" = None) -> "Look":
-        """A block with its motion; a look at it nearby makes it quicker."""
+        """A block with its motion; one nearby makes it quicker."""
         loads = Loads.of(block.cell, motion)
         figures = [*joint_figures(block.cell, motion, loads)]
         if motion.is_begun:
