@@ -1,6 +1,7 @@
 """The greatest feeds: what holds while a little more does not, what binds where, and how several tasks share them."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +9,15 @@ import pytest
 from builders.home_to_home import PICK_AND_PLACE
 from builders.three_feeds import THREE_FEEDS, approached
 
-from cellplan import Cell, Solution, load_cell, solve
+from cellplan import Cell, Solution, export_program, load_cell, open_gate, solve, write_run
+from cellplan.checks.joints.greatest_feeds import greatest_feeds
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.model.progress import silent
+from cellplan.model.report.between_rows import BetweenError, BetweenRows
 from cellplan.model.report.greatest_feed import BETWEEN_ROWS, GreatestFeed
 from cellplan.runs.greatest_feeds import open_feeds
 from cellplan.runs.solve import solve_motion
+from cellplan.scene.scene import Scene
 
 WRITTEN = {"motion.timing": "as_written"}
 
@@ -303,3 +307,47 @@ def test_the_share_of_a_controller_lowers_the_feeds_that_its_joints_bind(tmp_pat
 
     assert lower["ring"].greatest == pytest.approx(0.8 * full["ring"].greatest)
     assert lower["seam"].greatest == full["seam"].greatest
+
+
+def controlled(decimals: int) -> dict[str, object]:
+    """Values by which all three arms are programmed in step, with so many decimals of a degree."""
+    tasks = {f"T_ROB{place}": f"ROB_{place}" for place in (1, 2, 3)}
+    arms = zip(("left", "right", "top"), tasks, strict=True)
+    control = {f"robots.{arm}.controller": {"id": "irc5", "task": task, "decimals": decimals} for arm, task in arms}
+    return {"controllers": {"irc5": {"kind": "abb", "tasks": tasks}}} | control
+
+
+@pytest.mark.parametrize("decimals", [2, 3, 4, None])
+def test_rounding_of_programs_takes_its_part_of_the_tolerance_between_rows(
+    tmp_path: Path, decimals: int | None
+) -> None:
+    """A turn of each of three parallel axes by half a unit moves the tip by that times its distance from the axis."""
+    cell = cell_of(tmp_path, approached(), ring=60).with_values({} if decimals is None else controlled(decimals))
+    solution = planned(cell)
+    (run,), q = solution.runs, solution.motion.q
+    angles = np.cumsum(q[:, cell.columns("top")], axis=1)
+    arms = np.cumsum(([0.5, 0.4, 0.2] * np.exp(1j * angles))[:, ::-1], axis=1)
+    off = 0.0 if decimals is None else np.deg2rad(0.5 * 10.0**-decimals) * np.abs(arms).sum(axis=1).max()
+    none = BetweenError(largest=0.0, at_s=0.0, bound=0.0)
+    large = BetweenRows(position=replace(none, largest=4e-4, at_s=run.report.accuracy[2].end_s - 1.0), orientation=none)
+    accuracy = [replace(it, between=large) for it in run.report.accuracy]
+    positions = {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots}
+
+    ring = greatest_feeds(Scene.from_cell(cell), run.schedule, positions, accuracy)[-1]
+
+    assert (ring.task, ring.kind) == ("ring", BETWEEN_ROWS)
+    assert ring.greatest == pytest.approx(0.06 * ((1e-4 - min(off, 5e-5)) / 4e-4) ** 0.5, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_programs_of_a_run_at_its_greatest_feeds_hold_the_tolerance_between_rows(tmp_path: Path) -> None:
+    feeds = {"process": {"feed_mm_s": "greatest", "ramp_mm": 20}}
+    cell = run_in(tmp_path, **{"process.feed_mm_s": "greatest", "retract_mm": 5})
+    others = {f"tasks.{task}.{key}": value for task in ("bead", "seam") for key, value in feeds.items()}
+    solution = solve(cell.with_values(controlled(3) | others | {"motion.step_s": 0.0625}))
+    assert answers(solution)["ring"].kind == BETWEEN_ROWS
+    write_run(solution, tmp_path / "run")
+
+    names = export_program(open_gate(tmp_path / "run"), tmp_path / "rapid", form="rapid")
+
+    assert {"left.mod", "right.mod", "top.mod"} <= set(names)

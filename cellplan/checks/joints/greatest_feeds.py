@@ -2,7 +2,8 @@ r"""Greatest feeds: how fast each process could run along its path, place by pla
 
 With the ratio of all speeds fixed, everything scales with time: at a share :math:`\lambda` of a limit of velocity,
 acceleration or jerk the feed could be greater by :math:`\lambda^{-1}`, :math:`\lambda^{-1/2}` or
-:math:`\lambda^{-1/3}`. Errors of a tool between rows grow with the square of its speed.
+:math:`\lambda^{-1/3}`. Errors of a tool between rows grow with the square of its speed; of their tolerance as much
+is left as programs for controllers may put the tool off by the decimals of joint positions.
 """
 
 from collections.abc import Sequence
@@ -12,16 +13,19 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.measures.limit_shares import KINDS, ORDERS, rate_limits, row_loads
-from cellplan.model.cell.cell import RobotRows
+from cellplan.model.cell.cell import Robot, RobotRows
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.greatest_feed import BETWEEN_ROWS, TOOL_SPEED, GreatestFeed
 from cellplan.model.report.report import TaskAccuracy
+from cellplan.model.settings.controllers import RobotControlEntry
 from cellplan.model.settings.units import si_or_none
 from cellplan.model.task.clocked_path import are_within
-from cellplan.model.task.task import TIME_TOLERANCE, SampledPath
+from cellplan.model.task.task import TIME_TOLERANCE, Frame, SampledPath, Task
 from cellplan.scene.scene import Scene
 
 LEAST_SHARE: Final = 1e-12  # [-] of a limit: less is rounding of a joint at rest
+FEWEST_DECIMALS: Final = (4, 3)  # of a degree and a millimetre, in the languages of controllers where none are stated
+MOST_ROUNDED: Final = 0.5  # [-] of a tolerance that is left for rounding
 
 
 class _Load(NamedTuple):
@@ -45,7 +49,7 @@ def greatest_feeds(
         if abs(feed - task.process.feed) <= task.process.tolerance * task.process.feed:
             robots = dict.fromkeys((task.robot, *scene.cell.positioners))
             loads = [load for name in robots for load in _loads(scene, name, times, q[name])]
-            feeds.append(_greatest(times, scheduled, feed, [*loads, _between(times, scheduled, errors)]))
+            feeds.append(_greatest(times, scheduled, feed, [*loads, _between(scene, scheduled, errors, times, q)]))
     return tuple(feeds)
 
 
@@ -77,14 +81,41 @@ def _loads(scene: Scene, name: str, times: Array, q: Array) -> list[_Load]:
     return loads
 
 
-def _between(times: Array, scheduled: TaskSchedule, errors: TaskAccuracy) -> _Load:
+def _between(scene: Scene, scheduled: TaskSchedule, errors: TaskAccuracy, times: Array, q: RobotRows) -> _Load:
     """What the tolerance between rows asks for, where the error is largest."""
     shares, allowed = np.zeros(len(times)), scheduled.task.tolerance.between
     if errors.between is not None:
-        for error, tolerance in zip((errors.between.position, errors.between.orientation), allowed, strict=True):
+        both, rounding = (
+            (errors.between.position, errors.between.orientation),
+            rounding_of_programs(scene, scheduled.task, q),
+        )
+        for error, tolerance, off in zip(both, allowed, rounding, strict=True):
             row = int(np.argmin(np.abs(times - error.at_s)))
-            shares[row] = max(shares[row], (error.easing * error.largest / tolerance) ** 0.5)
+            left = tolerance - min(error.easing * off, MOST_ROUNDED * tolerance)
+            shares[row] = max(shares[row], (error.easing * error.largest / left) ** 0.5)
     return _Load(scheduled.task.name, BETWEEN_ROWS, shares)
+
+
+def rounding_of_programs(scene: Scene, task: Task, q: RobotRows) -> tuple[float, float]:
+    """By how much programs with rounded joint positions may put a tool off in [m] and turn it in [rad]."""
+    cell, on_part = scene.cell, task.relative_to is Frame.PART
+    holder = cell.robots[cell.carrier] if on_part and cell.carrier is not None else None
+    p = scene.chains[task.robot].tool_poses(q[task.robot])[:, :3, 3]
+    off, turned = np.zeros(len(p)), np.zeros(len(p))
+    for robot in (cell.robot(task.robot), holder):
+        if robot is not None and robot.control is not None:
+            screws, half = scene.chains[robot.name].flange_screws(q[robot.name]), _half_units(robot, robot.control)
+            moves = screws[:, :3] + np.cross(screws[:, 3:], p[:, :, None], axis=1)
+            off += np.linalg.norm(moves, axis=1) @ half
+            turned += np.linalg.norm(screws[:, 3:], axis=1) @ half
+    return float(off.max()), float(turned.max())
+
+
+def _half_units(robot: Robot, control: RobotControlEntry) -> Array:
+    """Half a unit of the last decimal of each joint in programs of its controller, in [rad] or [m], shape (n,)."""
+    decimals = FEWEST_DECIMALS if control.decimals is None else (control.decimals,) * 2
+    units = ((joint.display_unit.scale, decimals[0 if joint.is_revolute else 1]) for joint in robot.model.joints)
+    return np.array([0.5 * 10.0**-digits / scale for scale, digits in units])
 
 
 def _greatest(times: Array, scheduled: TaskSchedule, feed: float, loads: Sequence[_Load]) -> GreatestFeed:
