@@ -18,6 +18,7 @@ from cellplan.checks.joints.greatest_feeds import greatest_feeds
 from cellplan.checks.joints.limits import check_joints, check_shown, check_sums
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.joints.payload import check_payload, load_uses
+from cellplan.checks.joints.torques import check_torques, motion_torques
 from cellplan.checks.joints.transfer_speeds import check_idle, check_transfer_speeds
 from cellplan.checks.tools.between_checks import (
     check_between_rows,
@@ -201,10 +202,12 @@ def _with_loads(report: Report, scene: Scene, schedule: Schedule, X_WP: Array) -
     cell, chains, times, q = scene.cell, scene.chains, report.times, report.q
     loads = load_uses(cell, chains, times, q)
     forces = force_report(cell, chains, schedule, q, X_WP, report.closures)
+    torques = motion_torques(cell, schedule, q)
     return replace(
         report,
-        checks=(*report.checks, *check_payload(loads), *check_forces(cell, forces)),
+        checks=(*report.checks, *check_payload(loads), *check_forces(cell, forces), *check_torques(torques)),
         loads=loads,
+        torques=torques,
         forces=forces,
         base_reactions=tuple(base_reactions(cell, chains, times, q)),
     )

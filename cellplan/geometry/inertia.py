@@ -1,4 +1,4 @@
-"""Centre of mass and inertia of solids of uniform density."""
+"""Volume, centre of mass and inertia of solids of uniform density."""
 
 from typing import Final
 
@@ -28,6 +28,22 @@ def centre_and_inertia(solid: Solid) -> tuple[Array, Array]:
             return np.zeros(3), _capsule(radius, length)
         case Mesh():
             return _mesh(solid)
+    raise TypeError(f"not a solid: {solid!r}")
+
+
+def volume(solid: Solid) -> float:
+    """Volume in [m^3], of a mesh without its sign."""
+    match solid:
+        case Box(size):
+            return float(np.prod(size))
+        case Sphere(radius):
+            return float(4.0 / 3.0 * np.pi * radius**3)
+        case Cylinder(radius, length):
+            return float(np.pi * radius**2 * length)
+        case Capsule(radius, length):
+            return float(np.pi * radius**2 * (length + 4.0 / 3.0 * radius))
+        case Mesh():
+            return abs(float(np.linalg.det(solid.vertices[solid.faces]).sum() / 6.0))
     raise TypeError(f"not a solid: {solid!r}")
 
 

@@ -8,8 +8,9 @@ from cellplan.geometry.arrays import Array, first_peak
 from cellplan.measures.accelerations import row_motion
 from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.report.base_reaction import BaseReaction, PeakLoad
-from cellplan.scene.dynamics.loads import carried_masses, has_known_masses
+from cellplan.scene.dynamics.loads import carried_masses
 from cellplan.scene.dynamics.newton_euler import JointRows, joint_torques
+from cellplan.scene.dynamics.soundness import missing_masses
 from cellplan.scene.kinematics.screw_chain import Chains, ScrewChain
 
 
@@ -23,7 +24,7 @@ def base_reactions(cell: Cell, chains: Chains, times: Array, q: RobotRows) -> It
         q: Positions in [rad] or [m], shape (N, n), by robot.
     """
     for robot in cell.robots:
-        if has_known_masses(cell, robot):
+        if not missing_masses(cell, robot):
             chain, carried, at = chains[robot.name], carried_masses(cell, robot), q[robot.name]
             motion, zero = row_motion(times, at), np.zeros_like(at)
             moving, still = (

@@ -45,7 +45,7 @@ def motion_accelerations(
     times = schedule.times
     X_WT = {robot.name: chains[robot.name].tool_poses(q[robot.name]) for robot in cell.robots}
     cycles = {robot.name: robot.controller_cycle for robot in cell.robots}
-    judged = _judged(cell, times)
+    judged = judged_rows(cell, times)
     jumps_at = desired_jumps(schedule) if schedule.is_continuous else NO_TIMES
     joints = (_joints(robot, times, q[robot.name], judged=judged, jumps_at=jumps_at) for robot in cell.robots)
     return MotionAccelerations(
@@ -67,7 +67,7 @@ def joint_peaks(
         q: Positions in [rad] or [m], shape (N, n).
         jumps_at: Where the desired speed of a tool jumps, in [s], shape (J,).
     """
-    return _joints(robot, times, q, judged=_judged(cell, times), jumps_at=jumps_at)
+    return _joints(robot, times, q, judged=judged_rows(cell, times), jumps_at=jumps_at)
 
 
 def check_accelerations(cell: Cell, accelerations: MotionAccelerations) -> list[Check]:
@@ -106,7 +106,7 @@ def _joints(robot: Robot, times: Array, q: Array, *, judged: Flags, jumps_at: Ar
         )
 
 
-def _judged(cell: Cell, times: Array) -> Flags:
+def judged_rows(cell: Cell, times: Array) -> Flags:
     """Rows that are judged, shape (N,): all but those at which a joint fails."""
     step = float(times[-1]) / (len(times) - 1)
     judged = np.ones(len(times), dtype=bool)

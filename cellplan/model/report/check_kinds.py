@@ -105,6 +105,7 @@ _LISTED: Final = (  # the gravest first
     CheckKind("stop_clearance", "required clearance kept where a robot stops", "Clearance too small where a robot stops", excess=DISTANCE),
     CheckKind("joint_velocity", "joint velocities within their limits", "Joint too fast", group="joint speeds", concern=LIMIT, time_exponent=1.0),
     CheckKind("joint_acceleration", "joint accelerations within their limits", "Joint acceleration too high", group="joint accelerations", concern=LIMIT, time_exponent=0.5),
+    CheckKind("joint_torque", "torques of the drives within their limits", "Torque of a drive too large"),
     CheckKind("joint_acceleration_between_phases", "joint accelerations where phases meet within their limits", "Joint acceleration too high where phases meet", concern=LIMIT, time_exponent=0.5),
     CheckKind("joint_acceleration_assumed", "joint accelerations within assumed limits", "Joint acceleration above its assumed limit", group="joint accelerations", concern=LIMIT, time_exponent=0.5),
     CheckKind("joint_jerk", "joint jerk within its limits", "Joint jerk too high", concern=LIMIT, time_exponent=1 / 3),

@@ -20,6 +20,7 @@ from cellplan.model.report.smoothing import ListedErrors
 from cellplan.model.report.stops import StopReport
 from cellplan.model.robot.payload import LoadUse
 from cellplan.model.robot.repeatability import Repeatability
+from cellplan.model.robot.torque import RobotTorques
 from cellplan.model.task.clocked_path import Spans
 from cellplan.model.units import MM, DisplayUnit, joint_unit, rounded_down
 
@@ -294,6 +295,7 @@ class Report(Presented):
         accelerations: Accelerations, jerk and process speeds.
         loads: Load of each robot.
         forces: Torques by processes and weights, what holders exert on the part, and grips.
+        torques: Torques of each robot, or why they are not known.
         phases: All phases on the nominal time of the program; times of this report count from the begin of its own.
         idle: Names of the robots that stand at their homes all the time.
         phase: Name of the phase that it is for; None for the only one of a program.
@@ -323,6 +325,7 @@ class Report(Presented):
     accelerations: MotionAccelerations = UNKNOWN_ACCELERATIONS
     loads: tuple[LoadUse, ...] = ()
     forces: ForceReport = NO_FORCES
+    torques: tuple[RobotTorques, ...] = ()
     phases: tuple[Phase, ...] = ()
     idle: tuple[str, ...] = ()
     phase: str | None = None

@@ -51,6 +51,7 @@ from cellplan.report.record.sections.solver import NOT_PLANNED, PlanningFacts, S
 from cellplan.report.record.sections.stops import StopsKey, stops_record
 from cellplan.report.record.sections.tasks import TaskRecord, tasks_record
 from cellplan.report.record.sections.tool_errors import RunClosureRecord, closures_record
+from cellplan.report.record.sections.torques import TorquesKey, torques_record
 from cellplan.report.record.sections.world_motion import (
     MotionShareRecord,
     SingularityRecord,
@@ -104,7 +105,7 @@ class HeadRecord(OriginRecord, BeginRecord):
     caution: Annotated[str, "limits of an offline result"]
 
 
-class RunRecord(HeadRecord, SkewKey, StopsKey):
+class RunRecord(HeadRecord, SkewKey, StopsKey, TorquesKey):
     """The record of a run."""
 
     phase: Annotated[str | None, "name of the phase that it is for; null for the only one of a program"]
@@ -176,7 +177,7 @@ def run_record(phase: ReportedPhase, *, provenance: Provenance, planning: Planni
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "base_reactions": base_reactions_record(report.base_reactions),
-        "rests_on": rests_on_record(cell, report.loads, report.standoffs),
+        "rests_on": rests_on_record(cell, report.loads, report.standoffs, report.torques),
         "closest_pairs": closest_pairs_record(report.clearance),
         "clearance_proof": clearance_proof_record(report.clearance),
         "open_surfaces": open_surfaces_record(cell),
@@ -188,4 +189,5 @@ def run_record(phase: ReportedPhase, *, provenance: Provenance, planning: Planni
         "forces": forces_record(report.forces),
         **skew_record(report),
         **stops_record(report),
+        **torques_record(report.torques),
     }

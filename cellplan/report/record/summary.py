@@ -19,6 +19,7 @@ from cellplan.report.record.sections.skew import SkewKey, least_skew_record
 from cellplan.report.record.sections.solver import NOT_PLANNED, PlanningFacts, solver_record
 from cellplan.report.record.sections.tasks import TaskRecord
 from cellplan.report.record.sections.tool_errors import ClosureRecord, without_means
+from cellplan.report.record.sections.torques import TorquesKey, torques_of_phases
 
 
 class _RunEntry(TypedDict):
@@ -39,7 +40,7 @@ class RunEntry(_RunEntry, total=False):
     max_orientation_error_between_rows_deg: Annotated[Number, "largest angle between the rows"]
 
 
-class SummaryRecord(HeadRecord, SkewKey):
+class SummaryRecord(HeadRecord, SkewKey, TorquesKey):
     """The record of several runs: the worst of tasks, joints, clearance and accelerations."""
 
     runs: Annotated[dict[str, RunEntry], "by task: the runs"]
@@ -92,12 +93,14 @@ def _whole(
     transfers = {name: text for facts in planning for name, text in facts.transfers.items()}
     moved = tuple(dict.fromkeys(start for facts in planning for start in facts.moved))
     worst = worst_of([in_phase(_merged(record, cell), name) for name, record in records.items()])
-    rests_on = rests_on_record(cell, hardest_loads(reports), [tip for report in reports for tip in report.standoffs])
+    tips, torques = ([it for report in reports for it in getattr(report, key)] for key in ("standoffs", "torques"))
+    rests_on = rests_on_record(cell, hardest_loads(reports), tips, torques)
     return {
         **begin_record(reports, cell),
         "phases": phases_record(reports[0].phases),
         "runs": {name: in_phase(_run_entry(record, cell, folder=name), name) for name, record in records.items()},
         **least_skew_record(reports),
+        **torques_of_phases(reports, worst["torques"]),
         "tasks": worst["tasks"],
         "open_surfaces": open_surfaces_record(cell),
         "remarks": [text for _, text in cell.remarks],
@@ -132,6 +135,7 @@ def _merged(record: RunRecord, cell: Cell) -> Record:
         "forces": record["forces"],
         "payload": record["rests_on"]["payload"],
         "base_reactions": record["base_reactions"],
+        "torques": record.get("torques", {}),
     }
 
 
@@ -175,6 +179,8 @@ FIGURES: Final = (
     Figure("peak_velocity", max, "peak_velocity_at_s", ("velocity_ratio",)),
     Figure("peak_acceleration", max, "peak_acceleration_at_s", LIMIT),
     Figure("peak_jerk", max, "peak_jerk_at_s"),
+    Figure("peak_torque", max, "peak_torque_at_s", ("torque_ratio",)),
+    Figure("peak_power_w", max, "peak_power_at_s"),
     Figure("peak_acceleration_m_s2", max, "peak_acceleration_at_s"),
     Figure("peak_jerk_m_s3", max, "peak_jerk_at_s"),
     Figure("minimum_mm", min, AT, ("pair", "exact", "points_mm", "accuracies_mm")),

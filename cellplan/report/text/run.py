@@ -86,6 +86,7 @@ def _rows(record: Record) -> Iterator[Row]:
     yield from _margin_rows(record["joints"])
     yield from _speed_rows(record["joints"])
     yield from acceleration_rows(record)
+    yield from _torque_rows(record.get("torques", {}))
     yield from _task_rows(record["tasks"])
     yield from smoothing_rows(record["tasks"])
     yield from run_rows(record["tasks"])
@@ -200,6 +201,22 @@ def _speed_rows(joints: Record) -> Iterator[Row]:
     if driven:
         ratio, where = max(driven)
         yield "largest joint speed", f"{percent(ratio, 1)} of its limit", where
+
+
+def _torque_rows(torques: Record) -> Iterator[Row]:
+    """The drive with the largest share of its torque, and the work of all that is known."""
+    driven = [
+        (use["torque_ratio"], f"{robot} {joint} {instant_text(use, 'peak_torque_at_s')}")
+        for robot, record in torques.items()
+        for joint, use in record["joints"].items()
+        if use["torque_ratio"] is not None
+    ]
+    if driven:
+        ratio, where = max(driven)
+        yield "largest joint torque", f"{percent(ratio, 1)} of its limit", where
+    if torques:
+        energy = sum(record["energy_j"] for record in torques.values())
+        yield "work of the drives", f"{fixed(energy, 0)} J", f"of {', '.join(torques)}"
 
 
 def _program_lines(record: Record) -> Iterator[str]:

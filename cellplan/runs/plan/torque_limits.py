@@ -9,8 +9,9 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell.cell import Robot
 from cellplan.model.robot.inertia import CarriedMass
 from cellplan.planning.timing.torque_limits import TorqueLimits
-from cellplan.scene.dynamics.loads import carried_masses, has_known_masses
+from cellplan.scene.dynamics.loads import carried_masses
 from cellplan.scene.dynamics.newton_euler import JointRows, joint_torques
+from cellplan.scene.dynamics.soundness import missing_masses
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
@@ -23,7 +24,7 @@ def torque_limits(scene: Scene) -> tuple[TorqueLimits, ...]:
 def _torque_limits(scene: Scene) -> Iterator[TorqueLimits]:
     for robot in scene.cell.robots:
         largest = np.array([np.inf if joint.torque is None else joint.torque for joint in robot.model.joints])
-        if has_known_masses(scene.cell, robot) and np.isfinite(largest).any():
+        if np.isfinite(largest).any() and not missing_masses(scene.cell, robot):
             torques = partial(_torques, scene.chains[robot.name], robot, carried_masses(scene.cell, robot))
             yield TorqueLimits(columns=scene.cell.columns(robot.name), torques=torques, largest=largest)
 

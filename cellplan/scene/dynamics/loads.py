@@ -24,11 +24,6 @@ def part_share(cell: Cell, robot: Robot) -> float | None:
     return None if cell.part.mass is None else cell.part.mass / max(1, len(cell.positioners))
 
 
-def has_known_masses(cell: Cell, robot: Robot) -> bool:
-    """Whether the masses of its links and of all that it carries are stated."""
-    return robot.model.inertias is not None and None not in (tool_mass(robot), part_share(cell, robot))
-
-
 def carried_masses(cell: Cell, robot: Robot) -> list[CarriedMass]:
     """The tool and the share of the part, as far as their masses are stated.
 

@@ -13,10 +13,12 @@ from cellplan.model.report.report import Standoff
 from cellplan.model.robot.controller import ControllerZero
 from cellplan.model.robot.payload import LoadUse
 from cellplan.model.robot.robot import RobotModel
+from cellplan.model.robot.torque import RobotTorques
 from cellplan.model.units import MM
 from cellplan.report.record.common import Number, number
 from cellplan.report.record.sections.forces import unstated_forces
 from cellplan.report.record.sections.payload import LoadRecord, loads_record, unjudged_loads
+from cellplan.report.record.sections.torques import unjudged_torques
 
 IN_FRONT: Final = 0.005  # [m] by which a link's own body must stick out of the flange to be a tool: a disc does not
 UNKNOWN = "joint positions count from the model's zero, taken as the controller's; not confirmed"
@@ -53,7 +55,9 @@ class RestsOnRecord(TypedDict):
     lines: Annotated[list[str], "one line on each value that was not stated and therefore not judged"]
 
 
-def rests_on_record(cell: Cell, loads: Sequence[LoadUse], tips: Sequence[Standoff] = ()) -> RestsOnRecord:
+def rests_on_record(
+    cell: Cell, loads: Sequence[LoadUse], tips: Sequence[Standoff] = (), torques: Sequence[RobotTorques] = ()
+) -> RestsOnRecord:
     """Assumptions, and one line on each value that was not stated."""
     return {
         "bodies": bodies_record(cell),
@@ -65,6 +69,7 @@ def rests_on_record(cell: Cell, loads: Sequence[LoadUse], tips: Sequence[Standof
             *unstated_bodies(cell),
             *unjudged_loads(loads),
             *unstated_forces(cell),
+            *unjudged_torques(torques),
             *unstated_standoffs(cell, tips),
         ],
     }

@@ -1,0 +1,92 @@
+"""Torques in rows: largest and mean ones of each drive, work and power; no verdicts."""
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, first_peak
+from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.robot.torque import JointTorque, RobotTorques
+from cellplan.scene.dynamics.loads import carried_masses
+from cellplan.scene.dynamics.newton_euler import JointRows, joint_torques
+from cellplan.scene.dynamics.soundness import missing_masses
+from cellplan.scene.kinematics.screw_chain import ScrewChain
+
+
+def robot_torques(cell: Cell, robot: Robot, times: Array, q: Array, accelerations: Array) -> RobotTorques:
+    """Torques of one robot over a run.
+
+    From row to row the accelerations change linearly. The torques are worked out at the rows and halfway between them;
+    the largest one is that of the parabolas through two rows and the point between them, which differ from the torques
+    by terms of the third order in the step. That is an estimate, not a proof.
+
+    Args:
+        times: Times in [s], shape (N,).
+        q: Positions in [rad] or [m], shape (N, n).
+        accelerations: At the rows in [rad/s^2] or [m/s^2], with their signs, shape (N, n).
+    """
+    missing = missing_masses(cell, robot)
+    if missing:
+        return RobotTorques(robot=robot.name, missing=missing)
+    rows = halved_rows(times, q, accelerations)
+    chain = ScrewChain(robot)  # of its own: that of the checks has the displacements of the rows at hand
+    torques = joint_torques(chain, robot.model, rows, carried=carried_masses(cell, robot)).joints
+    halved = np.empty(2 * len(times) - 1)
+    halved[::2], halved[1::2] = times, 0.5 * (times[1:] + times[:-1])
+    power = np.sum(np.maximum(torques * rows.qd, 0.0), axis=1)
+    hardest = first_peak(power)
+    return RobotTorques(
+        robot=robot.name,
+        duration=float(times[-1] - times[0]),
+        joints=tuple(_joint(robot, index, times, torques[:, index]) for index in range(q.shape[1])),
+        energy=_integral(times, power),
+        peak_power=float(power[hardest]),
+        peak_power_at_s=float(halved[hardest]),
+    )
+
+
+def halved_rows(times: Array, q: Array, accelerations: Array) -> JointRows:
+    """A motion at N rows and halfway between them, 2 N - 1 in all, with accelerations that change linearly.
+
+    The speed at a row is the mean of those of the steps beside it, with rest before the first row and after the last.
+    """
+    steps = np.diff(times)[:, None]
+    speeds = np.diff(q, axis=0) / steps
+    still = np.zeros_like(q[:1])
+    at_rows = 0.5 * (np.concatenate([still, speeds]) + np.concatenate([speeds, still]))
+    middle = 0.5 * (accelerations[1:] + accelerations[:-1])
+    between = 0.5 * (q[1:] + q[:-1]) - 0.125 * steps * steps * middle
+    return JointRows(
+        q=_alternating(q, between), qd=_alternating(at_rows, speeds), qdd=_alternating(accelerations, middle)
+    )
+
+
+def _alternating(at_rows: Array, between: Array) -> Array:
+    """Values at rows and between them in their order."""
+    both = np.empty((len(at_rows) + len(between), at_rows.shape[1]))
+    both[::2], both[1::2] = at_rows, between
+    return both
+
+
+def _joint(robot: Robot, index: int, times: Array, torque: Array) -> JointTorque:
+    """The largest torque of a joint, at rows and in the parabolas between them, and the mean one."""
+    joint = robot.model.joints[index]
+    first, middle, last = torque[:-1:2], torque[1::2], torque[2::2]
+    slope, bend = -3.0 * first + 4.0 * middle - last, 2.0 * (first - 2.0 * middle + last)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = -0.5 * slope / bend
+    share = np.where((share > 0.0) & (share < 1.0), share, 0.0)
+    sizes = np.abs(np.stack([first, middle, last, first + share * (slope + share * bend)]))
+    step = first_peak(sizes.max(axis=0))
+    at = (0.0, 0.5, 1.0, float(share[step]))[first_peak(sizes[:, step])]
+    return JointTorque(
+        joint=joint.name,
+        is_revolute=joint.is_revolute,
+        peak=float(sizes.max()),
+        peak_at_s=float(times[step] + at * (times[step + 1] - times[step])),
+        rms=float(np.sqrt(_integral(times, torque * torque) / (times[-1] - times[0]))),
+        limit=joint.torque,
+    )
+
+
+def _integral(times: Array, halved: Array) -> float:
+    """Integral over the time of a quantity at rows and halfway between them, by Simpson's rule."""
+    return float(np.diff(times) @ (halved[:-1:2] + 4.0 * halved[1::2] + halved[2::2]) / 6.0)
