@@ -35,7 +35,8 @@ from cellplan.checks.tools.weld_position import check_arcs, check_weld_positions
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.measures.base_reactions import base_reactions
-from cellplan.measures.forces.static_forces import force_report
+from cellplan.measures.forces.static_forces import force_report, static_forces
+from cellplan.measures.forces.wrenches import NO_WRENCHES
 from cellplan.measures.joint_use import joint_uses
 from cellplan.measures.standoff import standoffs
 from cellplan.measures.tool_depth import tool_depths
@@ -201,15 +202,16 @@ def _with_loads(report: Report, scene: Scene, schedule: Schedule, X_WP: Array) -
     """The report with what robots carry and bear, and what their bases must hold."""
     cell, chains, times, q = scene.cell, scene.chains, report.times, report.q
     loads = load_uses(cell, chains, times, q)
-    forces = force_report(cell, chains, schedule, q, X_WP, report.closures)
-    torques = motion_torques(cell, schedule, q)
+    static = static_forces(cell, chains, schedule, q, X_WP, report.closures)
+    forces, acting = force_report(static, chains, q), NO_WRENCHES if static is None else static.by_processes
+    torques = motion_torques(cell, schedule, q, acting)
     return replace(
         report,
         checks=(*report.checks, *check_payload(loads), *check_forces(cell, forces), *check_torques(torques)),
         loads=loads,
         torques=torques,
         forces=forces,
-        base_reactions=tuple(base_reactions(cell, chains, times, q)),
+        base_reactions=tuple(base_reactions(cell, chains, times, q, acting)),
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, first_peak
 from cellplan.measures.accelerations import row_motion
+from cellplan.measures.forces.wrenches import NO_WRENCHES
 from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.report.base_reaction import BaseReaction, PeakLoad
 from cellplan.scene.dynamics.loads import carried_masses
@@ -14,7 +15,9 @@ from cellplan.scene.dynamics.soundness import missing_masses
 from cellplan.scene.kinematics.screw_chain import Chains, ScrewChain
 
 
-def base_reactions(cell: Cell, chains: Chains, times: Array, q: RobotRows) -> Iterator[BaseReaction]:
+def base_reactions(
+    cell: Cell, chains: Chains, times: Array, q: RobotRows, acting: RobotRows = NO_WRENCHES
+) -> Iterator[BaseReaction]:
     """What the bases of the robots with known masses must hold.
 
     Args:
@@ -22,14 +25,17 @@ def base_reactions(cell: Cell, chains: Chains, times: Array, q: RobotRows) -> It
         chains: Its robots.
         times: Times of the rows in [s], shape (N,).
         q: Positions in [rad] or [m], shape (N, n), by robot.
+        acting: What processes exert on the robots, at the origin of the world and expressed in it, shape (N, 6).
     """
     for robot in cell.robots:
         if not missing_masses(cell, robot):
             chain, carried, at = chains[robot.name], carried_masses(cell, robot), q[robot.name]
             motion, zero = row_motion(times, at), np.zeros_like(at)
             moving, still = (
-                joint_torques(chain, robot.model, JointRows(q=at, qd=qd, qdd=qdd), carried=carried).base_W
-                for qd, qdd in (motion, (zero, zero))
+                joint_torques(
+                    chain, robot.model, JointRows(q=at, qd=qd, qdd=qdd), carried=carried, wrench_W=wrench_W
+                ).base_W
+                for (qd, qdd), wrench_W in ((motion, acting.get(robot.name)), ((zero, zero), None))
             )
             yield _largest(robot.name, times, moving, still)
 

@@ -113,3 +113,21 @@ def test_of_several_phases_the_largest_values_stay_with_their_times() -> None:
     largest = largest_reactions([reaction("a", 3.0, 0.5), reaction("b", 9.0, 0.1), reaction("a", 4.0, 0.2)])
     assert largest["a"].horizontal == (4.0, 0.2)
     assert largest["b"].turning == (9.0, 0.1)
+
+
+def test_what_a_process_exerts_goes_through_the_base_to_the_floor() -> None:
+    """At rest the floor holds against it: the opposite force, and its moment about the origin of the base."""
+    robot = random_robot(4)
+    q = {robot.name: np.tile(swing(robot)[:1], (len(TIMES), 1))}
+    force, moment = np.array([300.0, -200.0, 500.0]), np.array([10.0, 20.0, 30.0])  # about the world origin
+    acting = {robot.name: np.tile([*force, *moment], (len(TIMES), 1))}
+    cell, chains = make_cell(robot), {robot.name: ScrewChain(robot)}
+
+    (idle,) = base_reactions(cell, chains, TIMES, q)
+    (pressed,) = base_reactions(cell, chains, TIMES, q, acting)
+
+    assert pressed.vertical.size == pytest.approx(abs(idle.weight - force[2]))
+    assert pressed.horizontal.size == pytest.approx(np.hypot(*force[:2]))
+    about_base = moment - np.cross(robot.X_WB[:3, 3], force)
+    assert pressed.turning.size == pytest.approx(abs(about_base[2]))
+    assert pressed.tilting_at_rest.size == pytest.approx(idle.tilting.size)

@@ -22,15 +22,15 @@ def _moments(cell: Cell, robot: Robot, load: JointLoad) -> Iterator[Check]:
     """The moment of load and process about one axis against that which the robot may carry."""
     limit = None if robot.model.payload is None else robot.model.payload.axes.get(load.joint)
     masses = tool_mass(robot), part_share(cell, robot)
-    if limit is None or limit.moment_nm is None or None in masses or load.by_process.value < LEAST:
+    if limit is None or limit.moment_nm is None or None in masses or load.by_process.size < LEAST:
         return
     subject, worst, most = f"{load.robot}/{load.joint}", load.total, limit.moment_nm
     text = (
-        f"process {subject}: moment of load and process {worst.value:.2f} Nm at {worst.at_s:.3f} s "
-        f"({load.by_process.value:.2f} Nm by the process alone), allowed {most:g} Nm"
+        f"process {subject}: moment of load and process {worst.size:.2f} Nm at {worst.at_s:.3f} s "
+        f"({load.by_process.size:.2f} Nm by the process alone), allowed {most:g} Nm"
     )
-    passed = worst.value <= most
-    yield Check("process_moment", subject, passed, text, value=worst.value, limit=most, unit="Nm", at_s=worst.at_s)
+    passed = worst.size <= most
+    yield Check("process_moment", subject, passed, text, value=worst.size, limit=most, unit="Nm", at_s=worst.at_s)
 
 
 def _grip(use: GripUse) -> Check:

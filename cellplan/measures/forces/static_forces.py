@@ -4,7 +4,7 @@ By virtual power over all robots and holders: for every motion of the joints the
 weights add up to zero. Weights of links are not in it.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,7 +16,8 @@ from cellplan.measures.forces.sharing import at_tip, closure_stiffness, load_sha
 from cellplan.measures.forces.wrenches import Wrenches, in_part, in_world, inertial_wrench, wrenches
 from cellplan.model.cell.cell import Cell, Grasp, Robot, RobotRows
 from cellplan.model.motion.motion import Schedule
-from cellplan.model.report.forces import NO_FORCES, ForceReport, GripUse, HolderLoad, InternalLoad, JointLoad, Peak
+from cellplan.model.report.base_reaction import PeakLoad
+from cellplan.model.report.forces import NO_FORCES, ForceReport, GripUse, HolderLoad, InternalLoad, JointLoad
 from cellplan.model.report.report import ClosureAccuracy
 from cellplan.scene.dynamics.loads import part_share, tool_mass
 from cellplan.scene.kinematics.screw_chain import Chains
@@ -47,6 +48,11 @@ class StaticForces:
         """What processes exert on a robot, through its tool or the part, shape (N, 6)."""
         return self.acting.on_tools[robot] + self.share(robot, self.acting.on_part)
 
+    @property
+    def by_processes(self) -> dict[str, Array]:
+        """The same by robot."""
+        return {robot.name: self.by_process(robot.name) for robot in self.cell.robots}
+
     def by_weight(self, robot: str) -> Array:
         """What the weights of tool and part exert on a robot, shape (N, 6)."""
         return self.acting.of_tools[robot] + self.share(robot, self.acting.of_part)
@@ -66,14 +72,16 @@ def static_forces(
     q: RobotRows,
     X_WP: Array,
     closures: Sequence[ClosureAccuracy] = (),
-) -> StaticForces:
-    """What acts on tools and part in a run.
+) -> StaticForces | None:
+    """What acts on tools and part in a run; None for a cell that states no force.
 
     Args:
         q: Positions in [rad] or [m], shape (N, n), by robot.
         X_WP: The part in the world, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed place.
         closures: Errors of the tools of further holders; none for exact closures.
     """
+    if not states_forces(cell):
+        return None
     X_WT = {robot.name: chains[robot.name].tool_poses(q[robot.name]) for robot in cell.robots}
     X_WP = np.broadcast_to(X_WP, (len(schedule.times), 4, 4))
     errors = np.zeros((len(cell.positioners), len(X_WP), 6))
@@ -98,22 +106,19 @@ def states_forces(cell: Cell) -> bool:
     return has_process or is_heavy or any(grasp.stiffness or (part.mass or grasp.grip) for grasp in part.held_by)
 
 
-def force_report(
-    cell: Cell,
-    chains: Chains,
-    schedule: Schedule,
-    q: RobotRows,
-    X_WP: Array,
-    closures: Sequence[ClosureAccuracy] = (),
-) -> ForceReport:
-    """Worst values over the rows of a run; nothing for a cell that states no force. Arguments as ``static_forces``."""
-    if not states_forces(cell):
+def force_report(forces: StaticForces | None, chains: Chains, q: RobotRows) -> ForceReport:
+    """Worst values over the rows of a run.
+
+    Args:
+        q: Positions in [rad] or [m], shape (N, n), by robot.
+    """
+    if forces is None:
         return NO_FORCES
-    forces = static_forces(cell, chains, schedule, q, X_WP, closures)
+    cell = forces.cell
     holders = tuple(_holder(forces, place, grasp) for place, grasp in enumerate(cell.part.held_by))
     return ForceReport(
         joints=tuple(load for robot in cell.robots for load in _joints(forces, robot, chains, q)),
-        holders=tuple(holder for holder in holders if holder.force.value > LEAST or holder.internal),
+        holders=tuple(holder for holder in holders if holder.force.size > LEAST or holder.internal),
         grips=tuple(_grips(forces)),
         length=sharing_length(cell.part) if cell.closures else None,
     )
@@ -226,14 +231,14 @@ def _grips(forces: StaticForces) -> Iterator[GripUse]:
             yield grip_use(grasp, grasp.grip, tip, forces.times, at_error=_at_error(forces, holder))
 
 
-def _peak_of(times: Array) -> Callable[[Array], Peak]:
+def _peak_of(times: Array) -> Callable[[Array], PeakLoad]:
     """What takes the largest size of values of shape (N,) at these times in [s]."""
 
-    def peak(values: Array) -> Peak:
+    def peak(values: Array) -> PeakLoad:
         """Largest size and its time; rounding is nothing."""
         sizes = np.where(np.abs(values) < LEAST, 0.0, np.abs(values))
         row = first_peak(sizes)
-        return Peak(value=float(sizes.max()), at_s=float(times[row]))
+        return PeakLoad(float(sizes.max()), float(times[row]))
 
     return peak
 
@@ -241,10 +246,3 @@ def _peak_of(times: Array) -> Callable[[Array], Peak]:
 def _place(cell: Cell, robot: str) -> int | None:
     """Number of a robot among the holders."""
     return cell.positioners.index(robot) if robot in cell.positioners else None
-
-
-def external_wrenches(forces: StaticForces) -> Mapping[str, Array]:
-    """What processes and the part, with its inertia, exert on the tool of each robot, shape (N, 6), by robot."""
-    moving = forces.acting.of_part + inertial_wrench(forces.cell.part, forces.times, forces.X_WP)
-    names = [robot.name for robot in forces.cell.robots]
-    return {name: forces.by_process(name) + forces.share(name, moving) for name in names}

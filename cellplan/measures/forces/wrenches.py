@@ -6,6 +6,7 @@ with a twist at that origin is ``w . V``, so joints balance it by ``tau = -J^T w
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -13,12 +14,13 @@ import numpy as np
 from cellplan.geometry.inertia import centre_and_inertia
 from cellplan.geometry.transforms import Array, cross, rotation_vector, transform_points
 from cellplan.measures.accelerations import changes_of_velocity, point_accelerations
-from cellplan.model.cell.cell import Cell, Part
+from cellplan.model.cell.cell import Cell, Part, RobotRows
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.task.clocked_path import are_within
 from cellplan.scene.dynamics.loads import GRAVITY
 
 UP: Final = np.array([0.0, 0.0, 1.0])
+NO_WRENCHES: Final[RobotRows] = MappingProxyType({})  # on robots, by their names
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -2,18 +2,11 @@
 
 from dataclasses import dataclass
 
+from cellplan.model.report.base_reaction import PeakLoad
 from cellplan.model.units import DisplayUnit
 
 TORQUE: DisplayUnit = DisplayUnit("Nm", 1.0)
 FORCE: DisplayUnit = DisplayUnit("N", 1.0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Peak:
-    """The largest size of a quantity over a run."""
-
-    value: float  # in [N] or [N m]
-    at_s: float  # its instant in [s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,9 +16,9 @@ class JointLoad:
     robot: str  # name of the robot
     joint: str  # name of the joint
     is_revolute: bool
-    total: Peak  # by both together, as far as they are stated
-    by_process: Peak  # by forces of processes alone
-    by_weight: Peak | None  # by weights of tool and part alone; None where one of these is not stated
+    total: PeakLoad  # by both together, as far as they are stated
+    by_process: PeakLoad  # by forces of processes alone
+    by_weight: PeakLoad | None  # by weights of tool and part alone; None where one of these is not stated
     limit: float | None  # of the joint, which its links load too; None when it is not stated
     by_closure: float | None  # at most by the stated errors of closure; None without these or a stiffness
 
@@ -39,8 +32,8 @@ class JointLoad:
 class InternalLoad:
     """What errors of closure make a holder exert on the part, by the stiffness of all holders."""
 
-    force: Peak  # by the errors that the tables have
-    moment: Peak  # likewise, about the tip
+    force: PeakLoad  # by the errors that the tables have
+    moment: PeakLoad  # likewise, about the tip
     force_at_error: float  # in [N], at most by the errors that are stated
     moment_at_error: float  # in [N m], likewise
 
@@ -50,8 +43,8 @@ class HolderLoad:
     """What the tool of a holder exerts on the part at its tip, by processes and the weight of the part, at rest."""
 
     robot: str  # name of the holder
-    force: Peak
-    moment: Peak  # about the tip
+    force: PeakLoad
+    moment: PeakLoad  # about the tip
     internal: InternalLoad | None  # None for a single holder, or where no stiffness is stated
 
 

@@ -13,7 +13,7 @@ from cellplan.checks.joints.payload import check_payload, load_uses
 from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
 from cellplan.geometry.arrays import Array
 from cellplan.measures.accelerations import part_acceleration
-from cellplan.measures.forces.static_forces import force_report
+from cellplan.measures.forces.static_forces import force_report, static_forces
 from cellplan.measures.joint_use import joint_uses
 from cellplan.measures.tool_errors import part_poses
 from cellplan.measures.velocity_jumps import NO_TIMES, desired_jumps
@@ -78,7 +78,8 @@ def motion_findings(played: ExecutedProgram, stretch: ExecutedStretch, scene: Sc
     speeds = {robot.name: robot_speed(robot, scene.chains[robot.name], times, q[robot.name]) for robot in cell.robots}
     checks = [*check_feeds(scene, schedule, q, X_WP), *check_tool_speeds(cell, speeds)]
     checks += check_payload(load_uses(cell, scene.chains, times, q))
-    checks += check_forces(cell, force_report(cell, scene.chains, schedule, q, X_WP))
+    forces = static_forces(cell, scene.chains, schedule, q, X_WP)
+    checks += check_forces(cell, force_report(forces, scene.chains, q))
     if cell.checks.part_acceleration_m_s2 is not None and cell.positioners:
         window = cell.robot(cell.positioners[0]).controller_cycle
         part = part_acceleration(cell, times, X_WP, window=window)

@@ -10,7 +10,7 @@ from cellplan.checks.joints.forces import check_forces
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import pose
 from cellplan.measures.forces.grips import grip_use
-from cellplan.measures.forces.static_forces import force_report
+from cellplan.measures.forces.static_forces import force_report, static_forces
 from cellplan.measures.forces.wrenches import GRAVITY
 from cellplan.measures.tool_errors import part_poses
 from cellplan.model.cell.cell import Cell, Grasp
@@ -34,7 +34,8 @@ def holding(mass: float | None, *, centre=(0.0, 0.0, 0.0), grip: GripEntry = GRI
 
 def forces_of(cell: Cell, q):
     chains, rows = {"a": ScrewChain(cell.robots[0])}, {"a": q[:, None]}
-    return force_report(cell, chains, schedule(len(q)), rows, part_poses(cell, chains, rows))
+    forces = static_forces(cell, chains, schedule(len(q)), rows, part_poses(cell, chains, rows))
+    return force_report(forces, chains, rows)
 
 
 def test_a_block_is_held_by_its_weight_over_the_friction_of_both_pads() -> None:

@@ -102,11 +102,11 @@ def _missing(cell: Cell) -> Iterator[str]:
 def _joint(load: JointLoad) -> JointLoadRecord:
     return {
         "unit": load.unit.name,
-        "torque": number(load.total.value),
+        "torque": number(load.total.size),
         "torque_at_s": number(load.total.at_s),
-        "by_process": number(load.by_process.value),
+        "by_process": number(load.by_process.size),
         "by_process_at_s": number(load.by_process.at_s),
-        "by_weight": None if load.by_weight is None else number(load.by_weight.value),
+        "by_weight": None if load.by_weight is None else number(load.by_weight.size),
         "by_weight_at_s": None if load.by_weight is None else number(load.by_weight.at_s),
         "limit": number(load.limit),
         "by_closure": number(load.by_closure),
@@ -115,9 +115,9 @@ def _joint(load: JointLoad) -> JointLoadRecord:
 
 def _holder(holder: HolderLoad) -> HolderLoadRecord:
     return {
-        "force_n": number(holder.force.value),
+        "force_n": number(holder.force.size),
         "force_at_s": number(holder.force.at_s),
-        "moment_nm": number(holder.moment.value),
+        "moment_nm": number(holder.moment.size),
         "moment_at_s": number(holder.moment.at_s),
         "internal": None if holder.internal is None else _internal(holder.internal),
     }
@@ -125,9 +125,9 @@ def _holder(holder: HolderLoad) -> HolderLoadRecord:
 
 def _internal(load: InternalLoad) -> InternalLoadRecord:
     return {
-        "force_n": number(load.force.value),
+        "force_n": number(load.force.size),
         "force_at_s": number(load.force.at_s),
-        "moment_nm": number(load.moment.value),
+        "moment_nm": number(load.moment.size),
         "moment_at_s": number(load.moment.at_s),
         "force_at_error_n": number(load.force_at_error),
         "moment_at_error_nm": number(load.moment_at_error),

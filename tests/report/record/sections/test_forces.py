@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 from builders.records import phase_record, whole_record
 
-from cellplan.model.report.forces import ForceReport, GripUse, HolderLoad, InternalLoad, JointLoad, Peak
+from cellplan.model.report.base_reaction import PeakLoad
+from cellplan.model.report.forces import ForceReport, GripUse, HolderLoad, InternalLoad, JointLoad
 from cellplan.report.page.render import report_page
 from cellplan.report.text.forces import force_rows
 
@@ -14,19 +15,15 @@ TURNING = JointLoad(
     robot="kuka",
     joint="B2",
     is_revolute=True,
-    total=Peak(value=40.0, at_s=1.0),
-    by_process=Peak(value=19.0, at_s=0.5),
-    by_weight=Peak(value=41.0, at_s=0.0),
+    total=PeakLoad(40.0, 1.0),
+    by_process=PeakLoad(19.0, 0.5),
+    by_weight=PeakLoad(41.0, 0.0),
     limit=800.0,
     by_closure=12.5,
 )
-SLIDING = replace(
-    TURNING, joint="rail", is_revolute=False, total=Peak(value=7.0, at_s=2.0), limit=None, by_closure=None
-)
-INTERNAL = InternalLoad(
-    force=Peak(value=0.25, at_s=1.5), moment=Peak(value=0.0, at_s=0.0), force_at_error=13.0, moment_at_error=5.5
-)
-HOLDER = HolderLoad(robot="reis", force=Peak(value=60.0, at_s=0.1), moment=Peak(value=3.0, at_s=0.2), internal=INTERNAL)
+SLIDING = replace(TURNING, joint="rail", is_revolute=False, total=PeakLoad(7.0, 2.0), limit=None, by_closure=None)
+INTERNAL = InternalLoad(force=PeakLoad(0.25, 1.5), moment=PeakLoad(0.0, 0.0), force_at_error=13.0, moment_at_error=5.5)
+HOLDER = HolderLoad(robot="reis", force=PeakLoad(60.0, 0.1), moment=PeakLoad(3.0, 0.2), internal=INTERNAL)
 GRIP = GripUse(robot="reis", share=0.16, at_s=1.25, tangential=44.0, torsion=1.5, normal=2.0, across=3.33)
 FORCES = ForceReport(joints=(TURNING, SLIDING), holders=(HOLDER,), grips=(GRIP,), length=0.7)
 
@@ -56,7 +53,7 @@ def test_the_record_has_every_figure_in_its_unit(passed_run: Any) -> None:
 
 
 def test_several_phases_have_the_worst_of_each_with_its_phase(passed_run: Any) -> None:
-    hard = replace(TURNING, total=Peak(value=50.0, at_s=0.25), by_process=Peak(value=0.0, at_s=0.0))
+    hard = replace(TURNING, total=PeakLoad(50.0, 0.25), by_process=PeakLoad(0.0, 0.0))
     slides = replace(GRIP, share=1.2, tangential=300.0)
     later = ForceReport(joints=(hard,), holders=(HOLDER,), grips=(slides,), length=0.7)
     reports = {"work": replace(passed_run.report, forces=FORCES), "place": replace(passed_run.report, forces=later)}
