@@ -11,7 +11,9 @@ from cellplan.scene.dynamics.soundness import missing_masses
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 
-def robot_torques(cell: Cell, robot: Robot, times: Array, q: Array, accelerations: Array) -> RobotTorques:
+def robot_torques(
+    cell: Cell, robot: Robot, times: Array, q: Array, accelerations: Array, acting: Array | None = None
+) -> RobotTorques:
     """Torques of one robot over a run.
 
     From row to row the accelerations change linearly. The torques are worked out at the rows and halfway between them;
@@ -22,13 +24,17 @@ def robot_torques(cell: Cell, robot: Robot, times: Array, q: Array, acceleration
         times: Times in [s], shape (N,).
         q: Positions in [rad] or [m], shape (N, n).
         accelerations: At the rows in [rad/s^2] or [m/s^2], with their signs, shape (N, n).
+        acting: What processes exert on the robot, at the origin of the world and expressed in it, shape (N, 6), linear
+            from row to row; None for nothing.
     """
     missing = missing_masses(cell, robot)
     if missing:
         return RobotTorques(robot=robot.name, missing=missing)
     rows = halved_rows(times, q, accelerations)
     chain = ScrewChain(robot)  # of its own: that of the checks has the displacements of the rows at hand
-    torques = joint_torques(chain, robot.model, rows, carried=carried_masses(cell, robot)).joints
+    wrench_W = None if acting is None else _alternating(acting, 0.5 * (acting[1:] + acting[:-1]))
+    carried = carried_masses(cell, robot)
+    torques = joint_torques(chain, robot.model, rows, carried=carried, wrench_W=wrench_W).joints
     halved = np.empty(2 * len(times) - 1)
     halved[::2], halved[1::2] = times, 0.5 * (times[1:] + times[:-1])
     power = np.sum(np.maximum(torques * rows.qd, 0.0), axis=1)

@@ -5,6 +5,7 @@ import numpy as np
 from cellplan.checks.joints.acceleration_limits import judged_rows
 from cellplan.geometry.arrays import Array
 from cellplan.measures.accelerations import joint_accelerations, point_accelerations
+from cellplan.measures.forces.wrenches import NO_WRENCHES
 from cellplan.measures.torques import robot_torques
 from cellplan.measures.velocity_jumps import NO_TIMES, desired_jumps
 from cellplan.model.cell.cell import Cell, Robot, RobotRows
@@ -13,11 +14,14 @@ from cellplan.model.report.report import Check
 from cellplan.model.robot.torque import JointTorque, RobotTorques
 
 
-def motion_torques(cell: Cell, schedule: Schedule, q: RobotRows) -> tuple[RobotTorques, ...]:
+def motion_torques(
+    cell: Cell, schedule: Schedule, q: RobotRows, acting: RobotRows = NO_WRENCHES
+) -> tuple[RobotTorques, ...]:
     """Torques of all robots, with the accelerations that are judged.
 
     Args:
         q: Positions that were read back in [rad] or [m], shape (N, n), by robot.
+        acting: What processes exert on robots, at the origin of the world and expressed in it, shape (N, 6).
     """
     times, judged = schedule.times, judged_rows(cell, schedule.times)
     jumps_at = desired_jumps(schedule) if schedule.is_continuous else NO_TIMES
@@ -28,7 +32,10 @@ def motion_torques(cell: Cell, schedule: Schedule, q: RobotRows) -> tuple[RobotT
         sizes = joint_accelerations(times, rows, cycle=robot.controller_cycle, jumps_at=jumps_at).values
         return np.where(judged[:, None], np.copysign(sizes, point_accelerations(times, rows)), 0.0)
 
-    return tuple(robot_torques(cell, robot, times, q[robot.name], accelerations(robot)) for robot in cell.robots)
+    return tuple(
+        robot_torques(cell, robot, times, q[robot.name], accelerations(robot), acting.get(robot.name))
+        for robot in cell.robots
+    )
 
 
 def check_torques(torques: tuple[RobotTorques, ...]) -> list[Check]:

@@ -57,6 +57,14 @@ def test_a_rod_at_rest_takes_its_weight() -> None:
     assert (use.energy, use.peak_power) == (0.0, 0.0)
 
 
+def test_what_a_process_exerts_is_held_beside_the_weight() -> None:
+    """20 N up at the end of the rod, about the origin of the world."""
+    pressed = {"a": np.tile([0.0, 0.0, 20.0, 0.0, -20.0 * LENGTH, 0.0], (401, 1))}
+    cell = cell_of(one_joint(axis=(0.0, 1.0, 0.0)))
+    (use,) = motion_torques(cell, clock(), {"a": np.zeros((401, 1))}, pressed)
+    assert use.joints[0].peak == pytest.approx((MASS * GRAVITY - 20.0) * LENGTH, rel=1e-12)
+
+
 def test_a_turn_about_the_vertical_takes_inertia_times_acceleration() -> None:
     use = use_of(one_joint(axis=(0.0, 0.0, 1.0)), smooth(TIMES, 1.5))
     whole = MASS * LENGTH**2 + INERTIA
