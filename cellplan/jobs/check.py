@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.checks.joints.payload import check_payload_at_rest
+from cellplan.checks.joints.torques import check_torques_at_rest
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.branches import MovedStart
@@ -119,7 +120,7 @@ def _check_together(scene: Scene, progress: Progress) -> CellCheck:
     words = "no collision at the start" if pair is None else f"'{pair[0]}' touches '{pair[1]}' at the start"
     bodies, value = ("cell", 0.0) if pair is None else (f"{pair[0]} - {pair[1]}", 1.0)
     at_start = Check("start_collision", bodies, pair is None, words, value=value, limit=0.0, unit="pairs", at_s=0.0)
-    loads = check_payload_at_rest(cell, scene.chains, start)
+    loads = [*check_payload_at_rest(cell, scene.chains, start), *check_torques_at_rest(cell, start)]
     return CellCheck(
         cell=started,
         searched=searched,

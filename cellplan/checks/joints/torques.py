@@ -38,6 +38,13 @@ def motion_torques(
     )
 
 
+def check_torques_at_rest(cell: Cell, start: Array) -> list[Check]:
+    """Whether the drives hold the robots at one stacked configuration of shape (nq,) in [rad] or [m]."""
+    still = {robot.name: np.tile(start[cell.columns(robot.name)], (2, 1)) for robot in cell.robots}
+    rows = ((robot, still[robot.name]) for robot in cell.robots)
+    return check_torques(tuple(robot_torques(cell, it, np.arange(2.0), q, np.zeros_like(q)) for it, q in rows))
+
+
 def check_torques(torques: tuple[RobotTorques, ...]) -> list[Check]:
     """Whether each drive has the torque that the motion takes, where both are known."""
     return [_check(use.robot, joint, joint.limit) for use in torques for joint in use.joints if joint.limit is not None]
@@ -48,6 +55,6 @@ def _check(robot: str, joint: JointTorque, limit: float) -> Check:
     verdict = "has a peak torque of" if passed else "exceeds its largest torque:"
     message = (
         f"joint {name} {verdict if joint.is_revolute else verdict.replace('torque', 'force')} {joint.peak:.4g} {unit} "
-        f"at {joint.peak_at_s:.3f} s (limit {limit:.5g} {unit}, mean {joint.rms:.4g} {unit})"
+        f"at {joint.peak_at_s:.3f} s (limit {limit:.5g} {unit}, root mean square {joint.rms:.4g} {unit})"
     )
     return Check("joint_torque", name, passed, message, value=joint.peak, limit=limit, unit=unit, at_s=joint.peak_at_s)

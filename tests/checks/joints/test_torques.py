@@ -1,12 +1,13 @@
 """Torques of the written motion: closed forms on one joint, what is not known, and programs of several phases."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from builders.scene_builders import arm_model, fixed_part, joint, make_cell, no_tool, placed, schedule
 
-from cellplan.checks.joints.torques import check_torques, motion_torques
+from cellplan.checks.joints.torques import check_torques, check_torques_at_rest, motion_torques
 from cellplan.files.robots.joint_table import load_bundled
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import Box
@@ -15,7 +16,7 @@ from cellplan.model.cell.cell import Cell, Tool
 from cellplan.model.robot.inertia import LinkInertia
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.robot.torque import RobotTorques, mean_torque
-from cellplan.report.record.sections.torques import torques_record, unjudged_torques
+from cellplan.report.record.sections.torques import torques_of_phases, torques_record, unjudged_torques
 from cellplan.scene.dynamics.loads import GRAVITY
 
 MASS, LENGTH, INERTIA = 3.0, 0.8, 0.05
@@ -84,8 +85,11 @@ def test_a_slide_upwards_takes_newtons() -> None:
     (check,) = check_torques((use_of(one_joint(axis=(0.0, 0.0, 1.0), slides=True, torque=25.0), np.zeros((401, 1))),))
     assert not check.passed
     assert check.value == pytest.approx(MASS * GRAVITY)
-    assert check.message == "joint a/a exceeds its largest force: 29.42 N at 0.000 s (limit 25 N, mean 29.42 N)"
-    held = "joint a/a has a peak force of 29.42 N at 0.000 s (limit 30 N, mean 29.42 N)"
+    assert (
+        check.message
+        == "joint a/a exceeds its largest force: 29.42 N at 0.000 s (limit 25 N, root mean square 29.42 N)"
+    )
+    held = "joint a/a has a peak force of 29.42 N at 0.000 s (limit 30 N, root mean square 29.42 N)"
     (enough,) = check_torques((use_of(one_joint(axis=(0.0, 0.0, 1.0), slides=True, torque=30.0), np.zeros((401, 1))),))
     assert enough.passed
     assert enough.message == held
@@ -129,7 +133,10 @@ def test_what_is_not_stated_is_one_line() -> None:
 def test_an_excess_is_named_with_its_instant() -> None:
     (check,) = check_torques((use_of(one_joint(axis=(0.0, 1.0, 0.0), torque=20.0), np.zeros((401, 1))),))
     assert not check.passed
-    assert check.message == "joint a/a exceeds its largest torque: 23.54 Nm at 0.000 s (limit 20 Nm, mean 23.54 Nm)"
+    assert (
+        check.message
+        == "joint a/a exceeds its largest torque: 23.54 Nm at 0.000 s (limit 20 Nm, root mean square 23.54 Nm)"
+    )
     assert (check.name, check.subject, check.unit) == ("joint_torque", "a/a", "Nm")
 
 
@@ -155,3 +162,24 @@ def test_a_record_has_the_robots_that_are_known() -> None:
     assert list(record["torques"]) == ["a"]
     assert record["torques"]["a"]["joints"]["a"]["torque_ratio"] == pytest.approx(23.536 / 40.0, rel=1e-4)
     assert torques_record((RobotTorques(robot="b", missing=("masses",)),)) == {}
+
+
+def test_a_posture_that_no_drive_holds_is_found_before_anything_moves() -> None:
+    cell = cell_of(one_joint(axis=(0.0, 1.0, 0.0), torque=20.0))
+    assert [check.passed for check in check_torques_at_rest(cell, np.zeros(1))] == [False]
+    assert [check.passed for check in check_torques_at_rest(cell, np.array([1.2]))] == [True]
+
+
+def test_means_and_work_of_a_program_are_those_of_all_its_time() -> None:
+    times = np.linspace(0.0, 6.0, 401)
+    model = one_joint(axis=(0.0, -1.0, 0.0))
+    up, wait = use_of(model, smooth(TIMES, 0.5)), use_of(model, np.full((401, 1), 0.5), times)
+    down = use_of(model, 0.5 - smooth(TIMES, 0.5))
+    whole_times = np.concatenate([TIMES[:-1], 2.0 + times[::15], 8.0 + TIMES[1:]])
+    reports = [SimpleNamespace(torques=(use,)) for use in (up, wait, down)]
+    worst = torques_record((up,))["torques"]
+    (record,) = torques_of_phases(reports, worst)["torques"].values()
+    squares = 2.0 * up.joints[0].rms ** 2 + 6.0 * wait.joints[0].rms ** 2 + 2.0 * down.joints[0].rms ** 2
+    assert record["joints"]["a"]["rms_torque"] == pytest.approx(np.sqrt(squares / whole_times[-1]), rel=1e-9)
+    assert record["energy_j"] == pytest.approx(up.energy + down.energy, rel=1e-9)
+    assert wait.energy == 0.0

@@ -148,3 +148,27 @@ def test_a_push_from_outside_is_held_by_virtual_power() -> None:
     free = joint_torques(chain, robot.model, rows)
     power = np.einsum("nkj,nk->nj", chain.flange_screws(rows.q), wrench)
     np.testing.assert_allclose(pushed.joints - free.joints, -power, atol=1e-12)
+
+
+@pytest.mark.parametrize("with_follower", [False, True], ids=["plain", "follower"])
+def test_torques_are_those_of_the_principle_of_d_alembert(with_follower: bool) -> None:
+    """The forces that accelerate each mass do the work of the drives when one joint is displaced a little."""
+    robot, times = random_robot(11, with_follower=with_follower), np.linspace(0.0, 3.0, 12)
+    rows, count = smooth_motion(robot, times), len(robot.model.joints)
+    before, now, after = (link_centres(robot, smooth_motion(robot, times + s).q) for s in (-STEP, 0.0, STEP))
+    expected = np.zeros((len(times), count))
+    for joint_number in range(count):
+        moves = [link_centres(robot, rows.q + side * STEP * np.eye(count)[joint_number]) for side in (-1.0, 1.0)]
+        for place, (mass, R, c) in enumerate(now):
+            (_, R0, c0), (_, R1, c1), (_, Rd, cd), (_, Ru, cu) = (
+                before[place],
+                after[place],
+                moves[0][place],
+                moves[1][place],
+            )
+            force = mass.mass * ((c1 - 2.0 * c + c0) / STEP**2 + np.array([0.0, 0.0, GRAVITY]))
+            expected[:, joint_number] += np.sum(force * (cu - cd), axis=1) / (2.0 * STEP)
+            second = 0.5 * np.trace(mass.inertia_B) * np.eye(3) - mass.inertia_B  # of the mass about its centre
+            pull = (R1 - 2.0 * R + R0) / STEP**2 @ second  # of all its points, and their places with them
+            expected[:, joint_number] += np.einsum("nij,nij->n", pull, (Ru - Rd) / (2.0 * STEP))
+    np.testing.assert_allclose(torques_of(robot, rows).joints, expected, atol=1e-5 * np.abs(expected).max())
