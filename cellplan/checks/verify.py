@@ -34,7 +34,6 @@ from cellplan.checks.tools.tracking import check_accuracy, check_closure
 from cellplan.checks.tools.weld_position import check_arcs, check_weld_positions
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
-from cellplan.measures.base_reactions import base_reactions
 from cellplan.measures.forces.static_forces import force_report, static_forces
 from cellplan.measures.forces.wrenches import NO_WRENCHES
 from cellplan.measures.joint_use import joint_uses
@@ -200,8 +199,8 @@ def _errors(
 
 def _with_loads(report: Report, scene: Scene, schedule: Schedule, X_WP: Array) -> Report:
     """The report with what robots carry and bear, and what their bases must hold."""
-    cell, chains, times, q = scene.cell, scene.chains, report.times, report.q
-    loads = load_uses(cell, chains, times, q)
+    cell, chains, q = scene.cell, scene.chains, report.q
+    loads = load_uses(cell, chains, report.times, q)
     static = static_forces(cell, chains, schedule, q, X_WP, report.closures)
     forces, acting = force_report(static, chains, q), NO_WRENCHES if static is None else static.by_processes
     torques = motion_torques(cell, schedule, q, acting)
@@ -211,7 +210,6 @@ def _with_loads(report: Report, scene: Scene, schedule: Schedule, X_WP: Array) -
         loads=loads,
         torques=torques,
         forces=forces,
-        base_reactions=tuple(base_reactions(cell, chains, times, q, acting)),
     )
 
 

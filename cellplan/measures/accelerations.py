@@ -53,18 +53,6 @@ def _spread(times: Array, values: Array) -> Array:
     return times.reshape(-1, *[1] * (values.ndim - 1))
 
 
-def row_motion(times: Array, q: Array) -> tuple[Array, Array]:
-    """Speeds and accelerations of joints at the rows, shape (N, n) each; the speed is the mean of the steps beside it.
-
-    Args:
-        times: Times in [s], shape (N,).
-        q: Positions in [rad] or [m], shape (N, n).
-    """
-    speeds = np.zeros((len(q) + 1, q.shape[1]))
-    speeds[1:-1] = np.diff(q, axis=0) / np.diff(times)[:, None]
-    return 0.5 * (speeds[1:] + speeds[:-1]), point_accelerations(times, q)
-
-
 def joint_accelerations(times: Array, q: Array, *, cycle: float, jumps_at: Array = NO_TIMES) -> RowAccelerations:
     """Sizes of the accelerations of joints at the rows; a jump of speed counts over the controller's cycle.
 

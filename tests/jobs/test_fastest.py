@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.commands import run_command
+from builders.rod_arms import rod_values
 from builders.two_phases import PAIR
 
 from cellplan import Cell, load_cell, solve
@@ -22,7 +23,8 @@ from cellplan.jobs.fastest.demand import calmest, read_demand, refuse_unless_pos
 from cellplan.jobs.fastest.result import curve_figures, fastest_record, write_fastest
 from cellplan.jobs.fastest.shortest import ShortestCycles, fastest
 from cellplan.jobs.fastest.timed_program import Law, TimedProgram, scaled_values
-from cellplan.report.record.figures import LOAD, energy_proxy
+from cellplan.model.robot.torque import RobotTorques
+from cellplan.report.record.figures import LOAD, energy_proxy, figures_of
 
 STEP = 0.01
 
@@ -89,6 +91,33 @@ def test_the_command_says_the_same(cell: Cell, cycles: ShortestCycles, tmp_path:
         assert said["failed"] == []
 
 
+@pytest.mark.slow
+def test_a_torque_that_binds_is_named_and_kept_by_every_program(cell: Cell, cycles: ShortestCycles) -> None:
+    limited = fastest(cell.with_values(rod_values(["left"], {"A": 4.0, "B": 2.0, "C": 0.4})), points=0)
+    record = fastest_record(limited)
+    for name in ("time_laws", "common_speed"):
+        program, binding = limited.programs[name], limited.programs[name].bindings[0]
+        assert program.cycle > cycles.programs[name].cycle
+        assert (binding.kind, program.solution.passed) == ("torque", True)
+        assert "% of its torque limit" in record["cycles"][name]["binding"][0]["text"]
+        torques = [check for check in program.solution.runs[0].report.checks if check.name == "joint_torque"]
+        assert 0.95 < max(check.value / check.limit for check in torques) <= 1.0
+        assert program.load == pytest.approx(binding.time_share)
+        assert record["cycles"][name]["figures"]["energy_j"] > 0.0
+
+
+def test_the_work_of_a_program_is_known_where_that_of_every_robot_is(cycles: ShortestCycles) -> None:
+    report = cycles.by_common_speed.solution.runs[0].report
+    known, unknown = RobotTorques(robot="left", energy=12.5), RobotTorques(robot="right", missing=("no masses",))
+
+    def work(*torques: RobotTorques) -> float | None:
+        return figures_of([replace(report, torques=torques), replace(report, torques=torques, phase="b")]).recorded(
+            "energy_j"
+        )
+
+    assert [work(known), work(known, known), work(known, unknown), work()] == [25.0, 50.0, None, None]
+
+
 def test_loads_fall_with_the_cycle_as_the_scaling_law_says(cycles: ShortestCycles) -> None:
     """Along one path velocities go with 1/T, accelerations with 1/T^2, the integral of velocity squared with 1/T.
 
@@ -147,6 +176,7 @@ def test_what_a_demand_saves_is_the_share_by_which_the_load_falls(cycles: Shorte
     demand = record["demand"]
     assert demand is not None
     calm, short = demand["program"]["figures"], record["cycles"]["common_speed"]["figures"]
+    assert demand["saving_against_shortest"].pop("energy_j") is None  # no masses are stated
     for name, share in demand["saving_against_shortest"].items():
         assert calm[name] == pytest.approx((1.0 - share) * short[name])
     # a cycle longer by f has velocities lower by f

@@ -8,9 +8,10 @@ from builders.dynamic_robots import random_robot
 from builders.scene_builders import make_cell, pose
 
 from cellplan.geometry.arrays import Array
-from cellplan.measures.base_reactions import base_reactions, standing_reactions
+from cellplan.measures.accelerations import point_accelerations
+from cellplan.measures.torques import robot_torques, standing_reactions
 from cellplan.model.cell.cell import Robot, Tool
-from cellplan.model.report.base_reaction import BaseReaction, PeakLoad, largest_reactions
+from cellplan.model.robot.base_reaction import BaseReaction, PeakLoad, largest_reactions
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 G = np.array([0.0, 0.0, -9.80665])
@@ -45,9 +46,9 @@ def momentum(robot: Robot, q: Array) -> tuple[Array, Array]:
     return linear, turning
 
 
-def reaction_of(robot: Robot) -> BaseReaction:
-    cell = make_cell(robot)
-    (reaction,) = base_reactions(cell, {robot.name: ScrewChain(robot)}, TIMES, {robot.name: swing(robot)})
+def reaction_of(robot: Robot, q: Array, acting: Array | None = None) -> BaseReaction:
+    reaction = robot_torques(make_cell(robot), robot, TIMES, q, point_accelerations(TIMES, q), acting).reaction
+    assert reaction is not None
     return reaction
 
 
@@ -70,7 +71,7 @@ def test_the_base_gives_what_momentum_gains_and_gravity_takes(seed: int) -> None
     weight = sum(it.mass for it in masses) * G
     force, moment = np.diff(linear, axis=0) / STEP - weight, np.diff(turning, axis=0) / STEP - pull[1:-1]
 
-    reaction = reaction_of(robot)
+    reaction = reaction_of(robot, q)
 
     assert reaction.weight == pytest.approx(-weight[2])
     assert reaction.vertical.size == pytest.approx(np.abs(force[:, 2]).max(), rel=1e-3)
@@ -118,13 +119,10 @@ def test_of_several_phases_the_largest_values_stay_with_their_times() -> None:
 def test_what_a_process_exerts_goes_through_the_base_to_the_floor() -> None:
     """At rest the floor holds against it: the opposite force, and its moment about the origin of the base."""
     robot = random_robot(4)
-    q = {robot.name: np.tile(swing(robot)[:1], (len(TIMES), 1))}
+    q = np.tile(swing(robot)[:1], (len(TIMES), 1))
     force, moment = np.array([300.0, -200.0, 500.0]), np.array([10.0, 20.0, 30.0])  # about the world origin
-    acting = {robot.name: np.tile([*force, *moment], (len(TIMES), 1))}
-    cell, chains = make_cell(robot), {robot.name: ScrewChain(robot)}
 
-    (idle,) = base_reactions(cell, chains, TIMES, q)
-    (pressed,) = base_reactions(cell, chains, TIMES, q, acting)
+    idle, pressed = reaction_of(robot, q), reaction_of(robot, q, np.tile([*force, *moment], (len(TIMES), 1)))
 
     assert pressed.vertical.size == pytest.approx(abs(idle.weight - force[2]))
     assert pressed.horizontal.size == pytest.approx(np.hypot(*force[:2]))

@@ -48,6 +48,7 @@ def floor_plan(options: FloorPlanOptions) -> None:
         write_floor_plan,
     )
     from cellplan.report.floor_plan.pendants import pendant_lines
+    from cellplan.report.record.sections.base_reactions import base_reactions_record
 
     request = options.to(FloorPlanRequest, form=PlanFormat(_format(options.form, options.output)))
     with progress_listener(quiet=options.quiet) as progress:
@@ -56,6 +57,7 @@ def floor_plan(options: FloorPlanOptions) -> None:
     size = write_floor_plan(plan, target, request.form)
     if options.as_json:
         about: dict[str, Any] = {"cell": plan.cell, "drawing": str(target), "format": str(request.form), "bytes": size}
+        about["base_reactions"] = base_reactions_record(robot.reaction for robot in plan.robots)
         if request.frames:
             about["frames"] = [pendant.record for pendant in plan.pendants]
         say_json({"schema": options.schema, "status": "written", "exit": int(ExitStatus.PASSED), **about})

@@ -26,7 +26,7 @@ from cellplan.report.plots.palette import PAPER, ROBOTS
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Record, as_json
-from cellplan.report.record.figures import KEY, csv_text
+from cellplan.report.record.figures import KEY, SHOWN, csv_text
 from cellplan.report.record.numbers import fixed, floored, seconds, small
 from cellplan.report.record.rows import listed_table
 from cellplan.study.trial import STATUS_TEXTS, TrialStatus
@@ -34,7 +34,7 @@ from cellplan.study.trial import STATUS_TEXTS, TrialStatus
 WORK: Final = tuple(f"work_{kind}_{part}" for kind in ("velocity", "acceleration") for part in ("ratio", "joint"))
 LOADS: Final = ("positioner_load_s", "positioner_phase_load_s", "operator_load_s", "operator_work_load_s", "load_s")
 SCHEMA: Final = "cellplan.study/1"
-SINGLE: Final = (*KEY, *WORK, "mean_velocity_ratio", *LOADS)
+SINGLE: Final = (*KEY, *WORK, "mean_velocity_ratio", "energy_j", *LOADS)
 MAX_SHOWN: Final = 30  # differing inputs, and letters of their values
 MAX_FAILED: Final = 3  # failed checks of a variant
 DASH: Final = "-"
@@ -195,6 +195,7 @@ ROWS: Final[Sequence[Row]] = (
     ("largest position error, mm", _plain("max_position_error_mm", small)),
     ("largest orientation error, deg", _plain("max_orientation_error_deg", small)),
     ("highest tool speed, mm/s", _plain("max_tool_speed_mm_s", "{:.0f}".format)),
+    ("work of the drives, J", lambda figures: SHOWN["energy_j"].page(figures.get("energy_j"))),
     ("mean velocity, % of limit", _plain("mean_velocity_ratio", lambda ratio: f"{100.0 * ratio:.2g}")),
     ("load of all robots, s", _plain("load_s", "{:.3g}".format)),
     ("positioner in its hardest phase, s", _plain("positioner_phase_load_s", "{:.3g}".format)),

@@ -22,7 +22,16 @@ from cellplan.report.plots.figure import Figure, Item, Limit, PlotAxis, PlotCurv
 from cellplan.report.plots.palette import INK, ROBOTS
 from cellplan.report.plots.svg import inline_svg, svg_text
 from cellplan.report.record.common import Number, Record, as_json, number
-from cellplan.report.record.figures import LOAD, SHOWN, Figures, csv_text, page_cells, page_headings, terminal_table
+from cellplan.report.record.figures import (
+    LOAD,
+    SHOWN,
+    UNKNOWN,
+    Figures,
+    csv_text,
+    page_cells,
+    page_headings,
+    terminal_table,
+)
 from cellplan.report.record.rows import by_name, columns_of, flat
 from cellplan.report.record.sections.tasks import greatest_feed_record
 from cellplan.report.text.run import feed_rows
@@ -42,28 +51,18 @@ SAVED: Final = {
     "max_acceleration_ratio": "joint acceleration",
     "max_tool_speed_mm_s": "tool speed",
     "energy_proxy_s": "energy proxy",
+    "energy_j": "work",
 }  # what a demand saves
+# fmt: off
 ON_TERMINAL: Final = (
-    "cycle_time_s",
-    "parts_per_h",
-    "max_velocity_ratio",
-    "max_acceleration_ratio",
-    "max_tool_speed_mm_s",
-    "energy_proxy_s",
-    "min_margin_deg",
+    "cycle_time_s", "parts_per_h", "max_velocity_ratio", "max_acceleration_ratio", "max_tool_speed_mm_s",
+    "energy_proxy_s", "min_margin_deg",
 )
 ON_PAGE: Final = (
-    "cycle_time_s",
-    "parts_per_h",
-    "max_velocity_ratio",
-    "max_velocity_joint",
-    "max_acceleration_ratio",
-    "max_acceleration_joint",
-    "max_tool_speed_mm_s",
-    "energy_proxy_s",
-    "min_margin_deg",
-    "min_margin_joint",
+    "cycle_time_s", "parts_per_h", "max_velocity_ratio", "max_velocity_joint", "max_acceleration_ratio",
+    "max_acceleration_joint", "max_tool_speed_mm_s", "energy_proxy_s", "energy_j", "min_margin_deg", "min_margin_joint",
 )
+# fmt: on
 PLOTTED: Final = (*SAVED, "min_margin_deg", "parts_per_h")
 NARROW: Final = 4.6  # [inch] of a plot: readable on a telephone too
 
@@ -248,6 +247,8 @@ def _program_lines(title: str, program: Record) -> Iterator[str]:
         f"above 250 mm/s {share}; "
         f"axes up to {figures['max_axis_speed_mm_s']:.4g} mm/s ({figures['max_axis_speed_joint']})"
     )
+    work = figures["energy_j"]
+    yield f"    work of the drives {UNKNOWN if work is None else f'{work:.4g} J'}"
     yield from (f"    FAILED {message}" for message in program["failed"])
 
 

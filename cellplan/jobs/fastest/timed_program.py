@@ -94,14 +94,13 @@ class TimedProgram:
         """
         scene, solution = solve_motion(cell.with_values(values), task=task, progress=progress, early=early)
         scaled = [run for run in solution.runs if _is_scaled(run, cell)]
-        rows = [_rows(run) for run in scaled]
         return cls(
             law=law,
             values=values,
             solution=solution,
             scene=scene,
             bindings=tuple(_binding(run, is_retimed=law in RETIMED) for run in scaled),
-            load=max(replace(limits, scene=scene, paths=()).slower(np.zeros(len(q)), q) for limits, q in rows),
+            load=max(_load(run, scene) for run in scaled),
         )
 
     def load_of(self, robot: str) -> float:
@@ -149,10 +148,17 @@ def _rows(run: Run) -> tuple[RowLimits, Array]:
     return row_limits(run.scene, run.schedule), np.concatenate([run.report.q[name] for name in names], axis=1)
 
 
+def _load(run: Run, scene: Scene) -> float:
+    """Share of the time of a phase in which the limits of joints, tools and part would allow the same motion."""
+    limits, q = _rows(run)
+    return replace(limits, scene=scene, paths=()).slower(run.schedule.times, q)
+
+
 def _demanded(run: Run) -> tuple[Array, Array]:
     """What of its limits each joint reaches, and what share of the time that asks for, by kind, shape (4, nq) each."""
     limits, q = _rows(run)
-    shares, (torque, slower) = limits.shares(run.schedule.times, q), limits.torques(run.schedule.times, q)
+    shares, times = limits.shares(run.schedule.times, q), run.schedule.times
+    torque, slower = limits.torques(times, q, sigma=times)
     required = [share**order for share, order in zip(shares, ORDERS, strict=True)]
     return np.array([*shares, torque]), np.array([*required, slower])
 

@@ -18,7 +18,7 @@ from cellplan.jobs.check import check
 from cellplan.jobs.view.cell_scene import standing
 from cellplan.jobs.view.describe import path_points
 from cellplan.jobs.view.run_scene import stored_series
-from cellplan.measures.base_reactions import standing_reactions
+from cellplan.measures.torques import standing_reactions
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.exported import Station

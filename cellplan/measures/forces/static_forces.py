@@ -16,9 +16,9 @@ from cellplan.measures.forces.sharing import at_tip, closure_stiffness, load_sha
 from cellplan.measures.forces.wrenches import Wrenches, in_part, in_world, inertial_wrench, wrenches
 from cellplan.model.cell.cell import Cell, Grasp, Robot, RobotRows
 from cellplan.model.motion.motion import Schedule
-from cellplan.model.report.base_reaction import PeakLoad
 from cellplan.model.report.forces import NO_FORCES, ForceReport, GripUse, HolderLoad, InternalLoad, JointLoad
 from cellplan.model.report.report import ClosureAccuracy
+from cellplan.model.robot.base_reaction import PeakLoad
 from cellplan.scene.dynamics.loads import part_share, tool_mass
 from cellplan.scene.kinematics.screw_chain import Chains
 

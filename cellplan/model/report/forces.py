@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from cellplan.model.report.base_reaction import PeakLoad
+from cellplan.model.robot.base_reaction import PeakLoad
 from cellplan.model.units import DisplayUnit
 
 TORQUE: DisplayUnit = DisplayUnit("Nm", 1.0)

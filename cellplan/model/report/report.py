@@ -9,7 +9,6 @@ from cellplan.model.cell.acceleration import UNKNOWN_ACCELERATIONS, MotionAccele
 from cellplan.model.cell.cell import RobotRows
 from cellplan.model.motion.plan import Phase
 from cellplan.model.presented import Presented
-from cellplan.model.report.base_reaction import BaseReaction
 from cellplan.model.report.between_rows import BetweenRows
 from cellplan.model.report.check_kinds import CHECK_KINDS, CheckKind
 from cellplan.model.report.forces import NO_FORCES, ForceReport
@@ -302,7 +301,6 @@ class Report(Presented):
         skew: How far the clocks of controllers may be apart; None for a cell that states no controllers.
         stops: What happens at worst when one robot stops; None where no controller states how its robots go on.
         greatest_feeds: Greatest feed of each process that has one feed, and holds it.
-        base_reactions: What the base of each robot with known masses must hold.
     """
 
     cell: str
@@ -332,7 +330,6 @@ class Report(Presented):
     skew: SkewReport | None = None
     stops: StopReport | None = None
     greatest_feeds: tuple[GreatestFeed, ...] = ()
-    base_reactions: tuple[BaseReaction, ...] = ()
 
     @property
     def passed(self) -> bool:

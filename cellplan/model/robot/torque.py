@@ -4,6 +4,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from cellplan.model.robot.base_reaction import BaseReaction
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointTorque:
@@ -35,6 +37,7 @@ class RobotTorques:
     energy: float = 0.0
     peak_power: float = 0.0  # largest sum of the powers of all drives that do work in [W]
     peak_power_at_s: float = 0.0  # its instant in [s]
+    reaction: BaseReaction | None = None  # what its base must hold
 
 
 def mean_torque(parts: Iterable[tuple[float, float]]) -> float:

@@ -294,13 +294,16 @@ class Retimer:
             velocity=self.bounds.velocity,
             acceleration=reserve * self.bounds.acceleration,
             highest=highest,
-            further=self._torques(piece.path.at(sigma), directions, lengths, reserve),
+            further=self._torques(piece.path, sigma, lengths, directions, reserve),
         )
 
-    def _torques(self, q: Array, directions: Array, lengths: Array, reserve: float) -> PathLoads | None:
+    def _torques(
+        self, path: JointPath, sigma: Array, lengths: Array, directions: Array, reserve: float
+    ) -> PathLoads | None:
         """Limited torques along a stretch, up to a share of what gravity leaves of the limits; None without any."""
         bent = np.gradient(directions, lengths, axis=0) if self.bounds.torques else directions
-        loads = [it.in_slow_motion(reserve**0.5).along(q, directions, bent) for it in self.bounds.torques]
+        limits, q = (it.in_slow_motion(reserve**0.5) for it in self.bounds.torques), path.at(sigma)
+        loads = [it.along(q, directions, bent, sigma=sigma) for it in limits]
         return reduce(PathLoads.joined, loads) if loads else None
 
     def _steps(self, piece: PathStretch, motion: TimedRows, duration: float) -> int:

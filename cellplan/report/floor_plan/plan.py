@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.model.report.base_reaction import BaseReaction
+from cellplan.model.robot.base_reaction import BaseReaction
 from cellplan.model.units import MM
 from cellplan.report.floor_plan.pendants import PlanPendant
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from cellplan.model.report.base_reaction import BaseReaction
+from cellplan.model.robot.base_reaction import BaseReaction
 from cellplan.report.floor_plan.plan import FloorPlan
 
 HEADINGS: Final = ("vertical N", "horizontal N", "tilting Nm", "turning Nm")

@@ -21,6 +21,7 @@ from cellplan.report.record.sections.joints import velocity_ratio
 
 SECONDS_PER_HOUR: Final = 3600.0
 REDUCED: Final = 250.0  # [mm/s]
+UNKNOWN: Final = "not stated"
 ALL: Final = "all"  # subject of what is measured of a phase as a whole
 Fold = Callable[..., Any]  # max, min or sum
 FiguresRecord = dict[str, dict[str, dict[str, Number]]]  # by phase, quantity and subject
@@ -74,6 +75,7 @@ _LISTED: Final = (
     FigureQuantity("share_above_250_mm_s", max, max, 1.0, "share_above_250_robot", None, "largest share of the cycle in which a tool tip is faster than 250 mm/s"),
     FigureQuantity("load_s", sum, sum, 1.0, "", None, "for all joints added up, the time that a joint needs for its travel at top speed"),
     FigureQuantity("energy_proxy_s", sum, sum, 1.0, "", None, "sum over all joints of the integral of (velocity / limit)^2 over the time"),
+    FigureQuantity("energy_j", sum, sum, 1.0, "", None, "work of the drives, without friction and motors; null unless the masses of all robots are stated"),
 )
 SHOWN: Final[Mapping[str, Shown]] = MappingProxyType({
     "cycle_time_s": Shown("cycle time<br>s", partial(fixed, digits=3), "cycle s", 1.0, "cycle time, in s"),
@@ -82,6 +84,7 @@ SHOWN: Final[Mapping[str, Shown]] = MappingProxyType({
     "max_acceleration_ratio": Shown("acceleration<br>of limit", partial(percent, digits=1), "acceleration %", 100.0, "highest joint acceleration, in % of its limit", 100.0),
     "max_tool_speed_mm_s": Shown("tool speed<br>mm/s", partial(fixed, digits=0), "tool mm/s", 1.0, "fastest tool tip in the world, in mm/s", REDUCED, "reduced speed"),
     "energy_proxy_s": Shown("energy proxy<br>s", small, "energy proxy s", 1.0, "energy proxy, in s"),
+    "energy_j": Shown("work<br>J", lambda value: UNKNOWN if value is None else fixed(value, 0), "work J", 1.0, "work of the drives, in J"),
     "min_margin_deg": Shown("margin<br>deg", floored, "margin deg", 1.0, "smallest joint margin, in deg"),
     "min_clearance_mm": Shown("clearance<br>mm", floored, "clearance mm", 1.0, "smallest certified clearance, in mm"),
 })
@@ -101,8 +104,8 @@ KEY: Final = (
 LOAD: Final = (
     "cycle_time_s", "parts_per_h", "load_ratio", "max_velocity_ratio", "max_velocity_joint", "max_acceleration_ratio",
     "max_acceleration_joint", "max_tool_speed_mm_s", "max_tool_speed_robot", "max_axis_speed_mm_s",
-    "max_axis_speed_joint", "share_above_250_mm_s", "share_above_250_robot", "energy_proxy_s", "min_margin_deg",
-    "min_margin_joint", "min_clearance_mm", "min_clearance_pair", "failed_checks",
+    "max_axis_speed_joint", "share_above_250_mm_s", "share_above_250_robot", "energy_proxy_s", "energy_j",
+    "min_margin_deg", "min_margin_joint", "min_clearance_mm", "min_clearance_pair", "failed_checks",
 )  # how hard joints and tools work at a cycle time
 
 
@@ -208,6 +211,8 @@ def _measured(report: Report) -> Iterator[tuple[str, str, float]]:
     yield "cycle_time_s", ALL, report.cycle_time
     yield "failed_checks", ALL, sum(not check.passed for check in report.checks)
     yield "energy_proxy_s", ALL, energy_proxy(report)
+    if report.torques and not any(use.missing for use in report.torques):
+        yield "energy_j", ALL, sum(use.energy for use in report.torques)
     for use in report.joints:
         joint = f"{use.robot}/{use.joint}"
         if use.is_revolute and np.isfinite(use.margin):

@@ -20,7 +20,7 @@ WORK: Final = ("velocity_ratio", "velocity_joint", "acceleration_ratio", "accele
 SHOWN: Final = (
     *KEY[:10],
     *("work_velocity_ratio", "work_velocity_joint", "work_acceleration_ratio", "work_acceleration_joint"),
-    *("min_clearance_mm", "min_clearance_pair", "min_clearance_certified", "max_tool_speed_mm_s"),
+    *("min_clearance_mm", "min_clearance_pair", "min_clearance_certified", "max_tool_speed_mm_s", "energy_j"),
     *("mean_velocity_ratio", "positioner_load_s", "positioner_phase_load_s", "operator_load_s"),
     *(
         "operator_work_load_s",
@@ -48,7 +48,7 @@ def variant_figures(record: Record, phases: Mapping[str, Record], *, proof: str)
     failed = [check for check in record["checks"] if not check["passed"]]
     cycle = record["cycle_time_s"]
     figures = {
-        **whole.record(KEY),
+        **whole.record((*KEY, "energy_j")),
         **{f"work_{key}": work.recorded(f"max_{key}") for key in WORK},
         "cycle_time_s": cycle,
         "min_clearance_certified": record["clearance"]["whole"]["certified"],

@@ -15,7 +15,7 @@ from cellplan.geometry.shapes import HalfSpace, Solid
 from cellplan.geometry.transforms import transform_points
 from cellplan.model.cell.cell import Cell, Robot, RobotRows
 from cellplan.model.motion.motion import Schedule
-from cellplan.model.report.base_reaction import BaseReaction
+from cellplan.model.robot.base_reaction import BaseReaction
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.task.task import Frame
 from cellplan.model.units import DEG, MM

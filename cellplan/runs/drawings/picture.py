@@ -10,9 +10,9 @@ from cellplan.geometry.shapes import HalfSpace, support
 from cellplan.geometry.transforms import transform_points
 from cellplan.model.cell.cell import Cell, RobotRows
 from cellplan.model.motion.motion import Schedule
-from cellplan.model.report.base_reaction import largest_reactions
 from cellplan.model.report.report import Report
 from cellplan.model.report.verified_run import VerifiedMotion
+from cellplan.model.robot.base_reaction import largest_reactions
 from cellplan.model.task.task import Frame
 from cellplan.model.units import MM
 from cellplan.report.floor_plan.sheet import floor_plan_svg
@@ -272,5 +272,5 @@ def _floor_plan(cell: Cell, phases: Sequence[DepictedPhase]) -> str:
     paths = {name: points for phase in phases for name, points in schedule_paths(phase.schedule).items()}
     whole = sum(phase.report.cycle_time for phase in phases)
     start = {name: q[0] for name, q in motions[0].items()}
-    reactions = largest_reactions(it for phase in phases for it in phase.report.base_reactions)
+    reactions = largest_reactions(it.reaction for phase in phases for it in phase.report.torques)
     return floor_plan_svg(floor_plan(cell, start, motions, paths, state=swept_state(whole), reactions=reactions))

@@ -228,16 +228,16 @@ class RowLimits:
             sigma: Nominal times of the rows in [s], shape (N,).
             q: Stacked joint positions in [rad] or [m], shape (N, nq).
         """
-        return max(self._slower_by_rates(sigma, q), self._slower_by_torques(q))
+        return max(self._slower_by_rates(sigma, q), self._slower_by_torques(sigma, q))
 
     def slower_at_first(self, sigma: Array, q: Array) -> float:
         """The same, but torques, which take longest to work out, count once all other limits hold."""
         factor = self._slower_by_rates(sigma, q)
-        return factor if factor > 1.0 else max(factor, self._slower_by_torques(q))
+        return factor if factor > 1.0 else max(factor, self._slower_by_torques(sigma, q))
 
-    def _slower_by_torques(self, q: Array) -> float:
+    def _slower_by_torques(self, sigma: Array, q: Array) -> float:
         times = np.round(np.arange(len(q)) * self.step, TIME_DECIMALS)
-        return float(self.torques(times, q)[1].max(initial=0.0))
+        return float(self.torques(times, q, sigma=sigma)[1].max(initial=0.0))
 
     def _slower_by_rates(self, sigma: Array, q: Array) -> float:
         """By which factor rows have to be slower for all limits but those of torques."""
@@ -249,11 +249,11 @@ class RowLimits:
         part = self._part_share(times, q) ** 0.5
         return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, tools, points, part)
 
-    def torques(self, times: Array, q: Array) -> tuple[Array, Array]:
+    def torques(self, times: Array, q: Array, *, sigma: Array) -> tuple[Array, Array]:
         """Largest torque of each joint as a share of its limit, and how much slower it asks for, shape (nq,) each."""
         shares, factors = np.zeros((2, q.shape[1]))
         for it in self.bounds.torques:
-            shares[it.columns], factors[it.columns] = it.in_rows(times, q)
+            shares[it.columns], factors[it.columns] = it.in_rows(times, q, sigma=sigma)
         return shares, factors
 
     def feeds(self, sigma: Array, times: Array) -> dict[str, float]:
@@ -316,8 +316,8 @@ class RowLimits:
 
 
 def row_limits(scene: Scene, schedule: Schedule) -> RowLimits:
-    """The limits in the rows of one phase; its schedule names the tasks."""
-    bounds = replace(joint_bounds(scene.cell), torques=torque_limits(scene))
+    """The limits in the rows of one phase; its schedule names the tasks, and says when their processes are on."""
+    bounds = replace(joint_bounds(scene.cell), torques=torque_limits(scene, schedule.tasks))
     return RowLimits(scene, schedule.paths, bounds, scene.cell.motion.step)
 
 

@@ -64,6 +64,9 @@ def test_what_a_process_exerts_is_held_beside_the_weight() -> None:
     cell = cell_of(one_joint(axis=(0.0, 1.0, 0.0)))
     (use,) = motion_torques(cell, clock(), {"a": np.zeros((401, 1))}, pressed)
     assert use.joints[0].peak == pytest.approx((MASS * GRAVITY - 20.0) * LENGTH, rel=1e-12)
+    assert use.reaction is not None
+    assert use.reaction.vertical.size == pytest.approx(MASS * GRAVITY - 20.0, rel=1e-12)
+    assert use.reaction.tilting_at_rest.size == pytest.approx(MASS * GRAVITY * LENGTH, rel=1e-12)
 
 
 def test_a_turn_about_the_vertical_takes_inertia_times_acceleration() -> None:
@@ -124,8 +127,8 @@ def test_what_is_not_stated_is_one_line() -> None:
     lines = unjudged_torques(uses)
     known = "masses of links not stated (a, b); largest torques not stated (c)"
     assert lines in (
-        [f"torques not judged: {known}; mass of the tool not stated (d)"],
-        [f"torques not judged: {known[:-1]}, d)"],  # an empty tool at the flange weighs nothing
+        [f"torques and base reactions not known: {known}; mass of the tool not stated (d)"],
+        [f"torques and base reactions not known: {known[:-1]}, d)"],  # an empty tool at the flange weighs nothing
     )
     assert check_torques(uses) == []
 

@@ -8,11 +8,12 @@ import pytest
 
 from cellplan.geometry.arrays import Array
 from cellplan.planning.timing.retime import JointLimitsInTime, RetimedPath, Retimer
-from cellplan.planning.timing.torque_limits import TorqueLimits, Torques
+from cellplan.planning.timing.torque_limits import TorqueLimits
+from cellplan.scene.dynamics.newton_euler import JointRows
 from tests.planning.timing.test_retime import bounds_of, path_of
 
 MASS, G = 3.0, 9.81  # [kg], [m/s^2]
-POINTS = 4000
+Equations = Callable[[Array, Array, Array], Array]  # positions, speeds and accelerations -> torques
 
 
 def lift(q: Array, qd: Array, qdd: Array) -> Array:
@@ -33,8 +34,14 @@ def flat_elbow(q: Array, qd: Array, qdd: Array) -> Array:
     return np.stack([first, second], axis=1)
 
 
-def limits_of(torques: Torques, *largest: float) -> TorqueLimits:
-    return TorqueLimits(columns=slice(0, len(largest)), torques=torques, largest=np.array(largest))
+def limits_of(torques: Equations, *largest: float) -> TorqueLimits:
+    """The limits of an arm by its equations of motion; a wrench pushes its joints by its first components."""
+
+    def pushed(rows: JointRows, wrench: Array | None) -> Array:
+        push = 0.0 if wrench is None else wrench[:, : len(largest)]
+        return torques(rows.q, rows.qd, rows.qdd) - push
+
+    return TorqueLimits(columns=slice(0, len(largest)), torques=pushed, largest=np.array(largest), cycle=1.0)
 
 
 def retimed(
@@ -44,7 +51,7 @@ def retimed(
     path = path_of(q)
 
     def slower(sigma: Array, q: Array) -> float:
-        return float(limits.in_rows(np.arange(len(q)) * step, q)[1].max())
+        return float(limits.in_rows(np.arange(len(q)) * step, q, sigma=sigma)[1].max())
 
     motion = Retimer(
         bounds=replace(bounds, torques=(limits,)), step=step, feed_share=lambda at: np.zeros(len(at)), slower=slower
@@ -88,7 +95,7 @@ def test_torques_of_an_elbow_are_those_of_lagrange_along_any_speed() -> None:
     limits, rng = limits_of(flat_elbow, 20.0, 8.0), np.random.default_rng(5)
     q, first, second = rng.normal(size=(3, 50, 2))
     u, x = rng.normal(size=(50, 1)), rng.uniform(size=(50, 1))
-    loads = limits.along(q, first, second)
+    loads = limits.along(q, first, second, sigma=np.zeros(50))
     torques = flat_elbow(q, first * np.sqrt(x), first * u + second * x)
     np.testing.assert_allclose(loads.along * u + loads.bent * x, torques / [20.0, 8.0], atol=1e-13)
 
@@ -104,6 +111,14 @@ def test_a_limit_of_torque_binds_somewhere_and_holds_in_every_row() -> None:
     assert np.median(share) > 0.9  # the fastest motion is at a limit nearly everywhere
 
 
+def test_a_push_of_a_process_leaves_less_or_more_of_the_limit_as_gravity_does() -> None:
+    """Pushed up by 10 N, a mass is lifted as if the limit were as much larger upwards and smaller downwards."""
+    pushed = replace(limits_of(lift, 45.0), wrench=lambda sigma, q: np.tile(10.0 * np.eye(6)[0], (len(q), 1)))
+    motion, _ = retimed(pushed, along(0.0, 1.0), step=0.002, bounds=bounds_of(100.0, np.inf))
+    up, down = 55.0 / MASS - G, 35.0 / MASS + G
+    assert 0.002 * motion.steps == pytest.approx(np.sqrt(2.0 * (1.0 / up + 1.0 / down)), abs=0.004)
+
+
 def test_a_limit_of_torque_that_never_binds_changes_nothing() -> None:
     bounds = bounds_of(1.0, 2.0)
     free = Retimer(bounds=bounds, step=0.01, feed_share=lambda at: np.zeros(len(at)), slower=lambda at, q: 1.0)
@@ -115,7 +130,7 @@ def test_a_limit_of_torque_that_never_binds_changes_nothing() -> None:
 def test_in_slow_motion_gravity_stays_and_the_motion_takes_up_less() -> None:
     limits = limits_of(lift, 45.0)
     q, u = np.zeros((1, 1)), np.ones((1, 1))
-    full, half = (it.along(q, u, 0.0 * u) for it in (limits, limits.in_slow_motion(0.5)))
+    full, half = (it.along(q, u, 0.0 * u, sigma=np.zeros(1)) for it in (limits, limits.in_slow_motion(0.5)))
     np.testing.assert_allclose(half.top, 0.25 * full.top)
     np.testing.assert_allclose(full.top * 45.0, 45.0 - MASS * G)
     np.testing.assert_allclose(full.bottom * 45.0, 45.0 + MASS * G)

@@ -16,7 +16,7 @@ from cellplan import load_cell
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Obstacle
-from cellplan.model.report.base_reaction import BaseReaction, PeakLoad
+from cellplan.model.robot.base_reaction import BaseReaction, PeakLoad
 from cellplan.report.floor_plan.dxf import floor_plan_dxf
 from cellplan.report.floor_plan.pendants import PlanFrame, PlanPendant
 from cellplan.report.floor_plan.plan import FloorPlan

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.rod_arms import rod_values
 from builders.scene_builders import make_cell
 from builders.transfer_cells import gantry
 from builders.uncertified import uncertified
@@ -61,18 +62,10 @@ def test_masses_without_a_largest_force_change_no_row() -> None:
     np.testing.assert_array_equal(*rows)
 
 
-def rod(begin: float, end: float, mass: float) -> dict[str, object]:
-    """A rod along x between two places in [mm]."""
-    across = mass * (1e-3 * (end - begin)) ** 2 / 12.0
-    inertia = [1e-3, 0.0, 0.0, across, 0.0, across]
-    return {"mass_kg": mass, "centre_mm": [0.5 * (begin + end), 0.0, 0.0], "inertia_kg_m2": inertia}
-
-
-RODS = {"A": rod(0.0, 500.0, 4.0), "B": rod(500.0, 900.0, 3.0), "C": rod(900.0, 1100.0, 1.0)}
 TORQUES = {"A": 8.0, "B": 4.0, "C": 1.0}  # [N m]
 
 
-def pair(timing: object) -> Cell:
+def pair(timing: object, **further: object) -> Cell:
     """Two planar arms of rods, retimed."""
     values = {
         "part.mass_kg": 1e-6,
@@ -83,11 +76,7 @@ def pair(timing: object) -> Cell:
         "tasks.circle.tolerance.between_rows_mm": 10,
         "tasks.circle.tolerance.between_rows_deg": 10,
     }
-    for robot in ("left", "right"):
-        values[f"robots.{robot}.tool.mass_kg"] = 1e-6
-        values[f"robots.{robot}.inertias"] = {"links": RODS, "source": "rods"}
-        values[f"robots.{robot}.limits"] = {joint: {"torque_nm": torque} for joint, torque in TORQUES.items()}
-    return load_cell(CELL).with_values(values)
+    return load_cell(CELL).with_values(values | further | rod_values(("left", "right"), TORQUES))
 
 
 def planar_torques(q: Array) -> Array:
@@ -126,5 +115,23 @@ def test_a_program_at_its_torque_limit_holds_it_by_equations_of_lagrange() -> No
     share = max(float((np.abs(planar_torques(q)) / largest).max()) for q in solution.runs[0].report.q.values())
     assert 0.97 <= share <= 1.005  # the middle of rows is not quite the row
     run = solution.runs[0]
+    checks = [check for check in run.report.checks if check.name == "joint_torque"]
+    assert len(checks) == 6
+    assert all(check.passed for check in checks)
+    assert max(check.value / check.limit for check in checks) > 0.99
     needed = row_limits(run.scene, run.schedule).slower(run.motion.sigma, run.motion.q)
     assert 0.98 <= needed <= 1.0
+
+
+@pytest.mark.slow
+def test_torques_of_retiming_are_those_that_are_checked_with_forces_of_processes_too() -> None:
+    force = {"frame": "world", "newton": [0.0, -2.0, 0.0]}
+    cell = pair("fastest", **{"tasks.circle.process": {"feed_mm_s": 200, "ramp_s": 0.4, "force": force}})
+    run = uncertified(cell).runs[0]
+    times, q = run.schedule.times, run.motion.q
+    shares, _ = row_limits(run.scene, run.schedule).torques(times, q, sigma=times)
+    checks = [check for check in run.report.checks if check.name == "joint_torque"]
+    np.testing.assert_allclose(shares, [check.value / check.limit for check in checks], rtol=1e-9)
+    silent = replace(run.schedule, tasks=())
+    without, _ = row_limits(run.scene, silent).torques(times, q, sigma=times)
+    assert np.abs(shares - without).max() > 0.1

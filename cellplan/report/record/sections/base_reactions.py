@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Annotated, Final, TypedDict
 
-from cellplan.model.report.base_reaction import BaseReaction, PeakLoad
+from cellplan.model.robot.base_reaction import BaseReaction, PeakLoad
 from cellplan.report.record.common import Number, Record, number
 
 PEAKS: Final = {"vertical": "n", "horizontal": "n", "tilting": "nm", "turning": "nm", "tilting_at_rest": "nm"}
@@ -25,9 +25,9 @@ class BaseReactionRecord(TypedDict):
     tilting_at_rest_at_s: Annotated[Number, "its time"]
 
 
-def base_reactions_record(reactions: Iterable[BaseReaction]) -> dict[str, BaseReactionRecord]:
+def base_reactions_record(reactions: Iterable[BaseReaction | None]) -> dict[str, BaseReactionRecord]:
     """Base reactions by robot."""
-    return {it.robot: _reaction_record(it) for it in reactions}
+    return {it.robot: _reaction_record(it) for it in reactions if it is not None}
 
 
 def _reaction_record(reaction: BaseReaction) -> BaseReactionRecord:

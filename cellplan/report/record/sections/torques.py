@@ -64,7 +64,7 @@ def unjudged_torques(torques: Iterable[RobotTorques]) -> list[str]:
             robots = reasons.setdefault(reason, [])
             robots += [use.robot] if use.robot not in robots else []
     texts = [f"{reason} ({', '.join(robots)})" for reason, robots in reasons.items()]
-    return [f"torques not judged: {'; '.join(texts)}"] if texts else []
+    return [f"torques and base reactions not known: {'; '.join(texts)}"] if texts else []
 
 
 def _means(uses: Iterable[RobotTorques], name: str) -> list[tuple[float, float]]:

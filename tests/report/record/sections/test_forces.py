@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from builders.records import phase_record, whole_record
 
-from cellplan.model.report.base_reaction import PeakLoad
 from cellplan.model.report.forces import ForceReport, GripUse, HolderLoad, InternalLoad, JointLoad
+from cellplan.model.robot.base_reaction import PeakLoad
 from cellplan.report.page.render import report_page
 from cellplan.report.text.forces import force_rows
 

@@ -25,10 +25,10 @@ class BaseReaction:
     tilting_at_rest: PeakLoad  # moment about a horizontal axis by weights alone, in any configuration of the motion
 
 
-def largest_reactions(reactions: Iterable[BaseReaction]) -> dict[str, BaseReaction]:
-    """The largest values over several phases, times as they have them, by robot."""
+def largest_reactions(reactions: Iterable[BaseReaction | None]) -> dict[str, BaseReaction]:
+    """The largest values over several phases, times as they have them, by robot; None is what is not known."""
     largest: dict[str, BaseReaction] = {}
-    for it in reactions:
+    for it in filter(None, reactions):
         other = largest.setdefault(it.robot, it)
         largest[it.robot] = BaseReaction(
             robot=it.robot,
