@@ -10,6 +10,7 @@ answers come in a second, where memory grows by more than 20 %, or where a repai
 import argparse
 import contextlib
 import math
+import os
 import re
 import subprocess
 import sys
@@ -121,7 +122,9 @@ def measured(browser: Browser, pid: int, options: argparse.Namespace) -> bool:
     circle(browser, x, y, min(5.0, options.seconds))  # begin: whatever is made once is made
     before = memory(browser, pid)
     browser.run("Object.assign(probe, { figures: [], pictures: [], answers: 0 });")
+    used = processor_s(pid)
     seconds = circle(browser, x, y, options.seconds)
+    used = processor_s(pid) - used
     after = memory(browser, pid)
     browser.pointer("Released", x, y)
     probe = browser.run("return probe;")
@@ -130,7 +133,8 @@ def measured(browser: Browser, pid: int, options: argparse.Namespace) -> bool:
     for name in ("figures", "pictures"):
         half, most, longest = np.percentile(probe[name], [50, 95, 100])
         print(f"  pointer to {name:9} {half:6.0f} ms half of them, {most:.0f} ms 95 % of them, {longest:.0f} ms all")
-    print(f"  answers            {rate:6.1f} in a second")
+    each = 1e3 * used / max(probe["answers"], 1)
+    print(f"  answers            {rate:6.1f} in a second, {each:.0f} ms of processor time of the session for each")
     for name, value in after.items():
         print(f"  memory, {name:10} {before[name]:6.1f} MB before, {value:.1f} MB after")
     is_bounded = all(value < MOST_GROWTH * before[name] for name, value in after.items())
@@ -159,6 +163,12 @@ def memory(browser: Browser, pid: int) -> dict[str, float]:
     pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     heap = browser.command("Runtime.getHeapUsage")["usedSize"]
     return {"page": 1e-6 * heap, "session": 1e-6 * 4096 * pages}
+
+
+def processor_s(pid: int) -> float:
+    """Processor time of the session in [s]."""
+    user, system = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
 def repaired(browser: Browser) -> bool:

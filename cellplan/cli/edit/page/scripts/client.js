@@ -60,18 +60,25 @@ class Client {
 
   async send() {
     this.isSending = true;
+    let show = () => {}; // the answer before, once the next change is on its way
     while (this.waiting && !this.isGone) {
       const { values, block } = this.waiting;
       const number = this.number;
       this.waiting = null;
       await this.guarded(async () => {
-        const answer = await this.record("/change", { number, block: block ?? null, values });
-        this.answered = number;
-        if (!answer.superseded) this.receivers.answer(answer);
+        const coming = this.record("/change", { number, block: block ?? null, values });
+        show();
+        show = () => { this.answered = number; };
+        const answer = await coming;
+        if (answer.superseded) return;
+        show = () => {
+          this.answered = number;
+          this.receivers.answer(answer);
+        };
       });
-      this.answered = number;
     }
     this.isSending = false;
+    show();
   }
 
   /** An action of the session, after the changes before it. */

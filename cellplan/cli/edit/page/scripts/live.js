@@ -2,7 +2,9 @@
 
 const KEY_ACTIONS = { c: "certify", i: "improve", r: "repair", m: "map" };
 const CONTROL_ACTIONS = { z: "undo", y: "redo", s: "save" };
-const SLOW_PICTURE_MS = 90; // between pictures that the processor draws during a drag
+const SLOW_PICTURE_MS = 90; // between pictures that the processor draws during a drag, each while an answer is awaited
+const LATE_PICTURE_MS = 200; // after which one is drawn without an answer
+const DRAGGED_SHARPNESS = 0.4; // pixels of such a picture by those of the window
 const BUTTONS = ["certify", "improve", "repair", "map", "stop", "undo", "redo", "reset", "save", "end"];
 
 class LiveApp extends App {
@@ -66,14 +68,14 @@ class LiveApp extends App {
     if (answer.version < this.version) return;
     this.version = answer.version;
     this.answer = answer;
-    const isBusy = this.client.isSending && this.client.waiting;
-    this.desired = isBusy || this.handles.held ? { ...answer.values, ...this.desired } : { ...answer.values };
+    this.desired = this.client.isSending || this.handles.held ? { ...answer.values, ...this.desired } : { ...answer.values };
     this.outcome.age(answer.version);
     this.pose(answer);
     this.bases.update(this.desired);
     this.figures.show(answer);
     this.controls.setScene();
     this.refresh();
+    if (this.postponed && performance.now() - (this.drawnAt ?? 0) > SLOW_PICTURE_MS) this.drawPostponed();
   }
 
   /** Bring robots, tools, part and obstacles where an answer has them. */
@@ -178,12 +180,19 @@ class LiveApp extends App {
       super.refresh();
       return;
     }
-    if (this.isPostponed) return;
-    this.isPostponed = true;
-    setTimeout(() => {
-      this.isPostponed = false;
-      super.refresh();
-    }, SLOW_PICTURE_MS);
+    this.postponed ||= setTimeout(() => this.drawPostponed(), LATE_PICTURE_MS);
+  }
+
+  /** Draw a picture that was put off: the next change is on its way, and its answer does not wait for the picture. */
+  drawPostponed() {
+    clearTimeout(this.postponed);
+    this.postponed = 0;
+    this.drawnAt = performance.now();
+    super.refresh();
+  }
+
+  get movingSharpness() {
+    return this.handles?.held ? DRAGGED_SHARPNESS : super.movingSharpness;
   }
 
   decorated(frame, state) {

@@ -1,6 +1,6 @@
 // The page: its data, its picture, and what connects time, camera and lists.
 
-const MOVING_SHARPNESS = 0.6; // pixels of the picture by those of the window
+const MOVING_SHARPNESS = 0.6; // pixels of the picture by those of the window, while it moves and the processor draws it
 
 class App {
   /** Parts are the classes of controls, lists and fields. */
@@ -154,6 +154,10 @@ class App {
     return this.player.isPlaying || this.camera.pointers.size > 0;
   }
 
+  get movingSharpness() {
+    return MOVING_SHARPNESS;
+  }
+
   /** What a page adds to the picture of an instant. */
   decorated(frame) {
     return frame;
@@ -162,7 +166,7 @@ class App {
   /** As many pixels as the window has; fewer while the picture moves and the processor draws it. */
   fitCanvas() {
     const canvas = byId("canvas");
-    const sharpness = this.isSlow ? (this.moves ? MOVING_SHARPNESS : 1) : Math.min(devicePixelRatio || 1, 2);
+    const sharpness = this.isSlow ? (this.moves ? this.movingSharpness : 1) : Math.min(devicePixelRatio || 1, 2);
     const size = [canvas.clientWidth, canvas.clientHeight].map((each) => Math.max(1, Math.round(each * sharpness)));
     if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
   }
