@@ -133,8 +133,8 @@ def measured(browser: Browser, pid: int, options: argparse.Namespace) -> bool:
     for name in ("figures", "pictures"):
         half, most, longest = np.percentile(probe[name], [50, 95, 100])
         print(f"  pointer to {name:9} {half:6.0f} ms half of them, {most:.0f} ms 95 % of them, {longest:.0f} ms all")
-    each = 1e3 * used / max(probe["answers"], 1)
-    print(f"  answers            {rate:6.1f} in a second, {each:.0f} ms of processor time of the session for each")
+    used_ms = 1e3 * used / max(probe["answers"], 1)
+    print(f"  answers            {rate:6.1f} in a second, {used_ms:.0f} ms of processor time of the session for each")
     for name, value in after.items():
         print(f"  memory, {name:10} {before[name]:6.1f} MB before, {value:.1f} MB after")
     is_bounded = all(value < MOST_GROWTH * before[name] for name, value in after.items())
