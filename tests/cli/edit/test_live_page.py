@@ -169,6 +169,29 @@ def test_one_change_is_in_flight_and_the_newest_waits(page: Browser, session: Fa
     assert numbers == sorted(set(numbers))
 
 
+def test_the_next_change_is_sent_before_an_answer_is_shown_and_keeps_what_is_desired(page: Browser) -> None:
+    order = page.run(f"""
+      const order = [], address = "robots.left.base.x_mm";
+      const [record, show] = [app.client.record.bind(app.client), app.client.receivers.answer];
+      app.client.record = (path, body) => {{
+        order.push(`sent ${{body.values[address]}}`);
+        return record(path, body);
+      }};
+      app.client.receivers.answer = (answer) => {{
+        show(answer);
+        const number = byId("figures").dataset.number - first;
+        order.push(`shown ${{answer.values[address]}} desired ${{app.desired[address]}} of ${{number}}`);
+      }};
+      const first = app.client.number;
+      app.change({{ [address]: 1 }});
+      app.change({{ [address]: 2 }});
+      {IDLE}
+      return order;
+    """)
+
+    assert order == ["sent 1", "sent 2", "shown 1 desired 2 of 1", "shown 2 desired 2 of 2"]
+
+
 def test_a_field_is_typed_and_stepped_by_arrow_keys(page: Browser, session: FakeSession) -> None:
     field = "document.querySelector('[data-address=\"robots.left.base.x_mm\"]')"
     page.run(f"{field}.focus(); {field}.select();")
