@@ -24,10 +24,10 @@ def _moments(cell: Cell, robot: Robot, load: JointLoad) -> Iterator[Check]:
     masses = tool_mass(robot), part_share(cell, robot)
     if limit is None or limit.moment_nm is None or None in masses or load.by_process.size < LEAST:
         return
-    subject, worst, most = f"{load.robot}/{load.joint}", load.total, limit.moment_nm
+    subject, worst, most = f"{load.robot}/{load.joint}", load.moving, limit.moment_nm
     text = (
         f"process {subject}: moment of load and process {worst.size:.2f} Nm at {worst.at_s:.3f} s "
-        f"({load.by_process.size:.2f} Nm by the process alone), allowed {most:g} Nm"
+        f"({load.total.size:.2f} Nm at rest, {load.by_process.size:.2f} Nm by the process alone), allowed {most:g} Nm"
     )
     passed = worst.size <= most
     yield Check("process_moment", subject, passed, text, value=worst.size, limit=most, unit="Nm", at_s=worst.at_s)
@@ -35,9 +35,11 @@ def _moments(cell: Cell, robot: Robot, load: JointLoad) -> Iterator[Check]:
 
 def _grip(use: GripUse) -> Check:
     """Whether friction holds the part."""
-    share = PERCENT * use.share
+    share, across = PERCENT * use.share, ""
+    if use.across > LEAST:
+        across = f"; up to {use.across:.4g} Nm across it not judged"
     text = (
         f"grip of {use.robot}: needs {share:.1f} % of its friction at {use.at_s:.3f} s ({use.tangential:.4g} N along "
-        f"the pads, {use.torsion:.4g} Nm about their normal, {use.normal:.4g} N along it)"
+        f"the pads, {use.torsion:.4g} Nm about their normal, {use.normal:.4g} N along it){across}"
     )
     return Check("grip_slip", use.robot, use.share <= 1.0, text, value=share, limit=PERCENT, unit="%", at_s=use.at_s)

@@ -13,7 +13,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array, first_peak
 from cellplan.measures.forces.grips import grip_use
 from cellplan.measures.forces.sharing import at_tip, closure_stiffness, load_shares, sharing_length
-from cellplan.measures.forces.wrenches import Wrenches, in_part, in_world, inertial_wrench, wrenches
+from cellplan.measures.forces.wrenches import Wrenches, in_part, in_world, wrenches
 from cellplan.model.cell.cell import Cell, Grasp, Robot, RobotRows
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.forces import NO_FORCES, ForceReport, GripUse, HolderLoad, InternalLoad, JointLoad
@@ -56,6 +56,10 @@ class StaticForces:
     def by_weight(self, robot: str) -> Array:
         """What the weights of tool and part exert on a robot, shape (N, 6)."""
         return self.acting.of_tools[robot] + self.share(robot, self.acting.of_part)
+
+    def by_inertia(self, robot: str) -> Array:
+        """What tool and part exert on a robot by their accelerations in the written motion, shape (N, 6)."""
+        return self.acting.inertia_of_tools[robot] + self.share(robot, self.acting.inertia_of_part)
 
     def internal(self, holder: int) -> Array | None:
         """What a holder exerts on the part by errors of closure, at the origin of P and in it, shape (N, 6)."""
@@ -144,6 +148,7 @@ def _joints(forces: StaticForces, robot: Robot, chains: Chains, q: RobotRows) ->
     is_known = None not in {tool_mass(robot), part_share(forces.cell, robot)}
     at = _peak_of(forces.times)
     process, weight = joint_torques(screws, by_process), joint_torques(screws, by_weight)
+    moving = process + weight + joint_torques(screws, forces.by_inertia(robot.name))
     by_closure = None if bound is None else _by_closure(forces, screws, bound)
     for column, joint in enumerate(robot.model.joints):
         yield JointLoad(
@@ -151,6 +156,7 @@ def _joints(forces: StaticForces, robot: Robot, chains: Chains, q: RobotRows) ->
             joint=joint.name,
             is_revolute=joint.is_revolute,
             total=at(process[:, column] + weight[:, column]),
+            moving=at(moving[:, column]),
             by_process=at(process[:, column]),
             by_weight=at(weight[:, column]) if is_known else None,
             limit=joint.torque,
@@ -223,7 +229,7 @@ def _grips(forces: StaticForces) -> Iterator[GripUse]:
     cell, acting = forces.cell, forces.acting
     if cell.part.mass is None or not any(grasp.grip for grasp in cell.part.held_by):
         return
-    on_part = acting.on_part + acting.of_part + inertial_wrench(cell.part, forces.times, forces.X_WP)
+    on_part = acting.on_part + acting.of_part + acting.inertia_of_part
     for holder, grasp in enumerate(cell.part.held_by):
         if grasp.grip is not None:
             exerted, internal = -in_part(forces.X_WP, on_part) @ forces.shares[holder].T, forces.internal(holder)

@@ -31,6 +31,8 @@ class Wrenches:
     of_tools: Mapping[str, Array]  # weight of the tool, by robot
     on_part: Array  # of all processes on the part
     of_part: Array  # weight of the part
+    inertia_of_tools: Mapping[str, Array]  # of the tool as a point in the written motion, by robot
+    inertia_of_part: Array  # of the part in the written motion
 
 
 def wrenches(cell: Cell, schedule: Schedule, X_WT: Mapping[str, Array], X_WP: Array) -> Wrenches:
@@ -50,14 +52,22 @@ def wrenches(cell: Cell, schedule: Schedule, X_WT: Mapping[str, Array], X_WP: Ar
         wrench = _of_process(scheduled, schedule.times, X_WT[task.robot], X_WP)
         on_tools[task.robot] = on_tools[task.robot] + wrench
         on_part = on_part - (wrench if task.is_on_part else 0.0)
-    of_tools = {}
+    of_tools, inertia_of_tools = {}, {}
     for robot in cell.robots:
         X, tool = X_WT[robot.name], robot.tool
         centre_T = np.zeros(3) if tool.centre is None else tool.X_FT[:3, :3].T @ (tool.centre - tool.X_FT[:3, 3])
-        of_tools[robot.name] = weight(tool.mass or 0.0, transform_points(X, centre_T[None])[:, 0])
+        mass, centres = tool.mass or 0.0, transform_points(X, centre_T[None])[:, 0]
+        of_tools[robot.name] = weight(mass, centres)
+        inertia_of_tools[robot.name] = at_origin(-mass * point_accelerations(schedule.times, centres), centres)
     centres = transform_points(X_WP, centre_of(cell.part)[None])[:, 0]
-    of_part = weight(cell.part.mass or 0.0, centres)
-    return Wrenches(on_tools=on_tools, of_tools=of_tools, on_part=on_part, of_part=of_part)
+    return Wrenches(
+        on_tools=on_tools,
+        of_tools=of_tools,
+        on_part=on_part,
+        of_part=weight(cell.part.mass or 0.0, centres),
+        inertia_of_tools=inertia_of_tools,
+        inertia_of_part=inertial_wrench(cell.part, schedule.times, X_WP),
+    )
 
 
 def at_origin(force: Array, points: Array, moment: Array | float = 0.0) -> Array:

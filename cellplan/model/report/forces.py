@@ -17,6 +17,7 @@ class JointLoad:
     joint: str  # name of the joint
     is_revolute: bool
     total: PeakLoad  # by both together, as far as they are stated
+    moving: PeakLoad  # likewise, and by the accelerations of tool and part in the written motion
     by_process: PeakLoad  # by forces of processes alone
     by_weight: PeakLoad | None  # by weights of tool and part alone; None where one of these is not stated
     limit: float | None  # of the joint, which its links load too; None when it is not stated

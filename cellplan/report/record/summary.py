@@ -196,6 +196,7 @@ FIGURES: Final = (
     *(Figure(f"{key}_nm", max, f"{key}_at_s") for key in ("tilting", "turning", "tilting_at_rest")),
     Figure("weight_n", max, ""),
     Figure("torque", max, "torque_at_s"),
+    Figure("moving", max, "moving_at_s"),
     Figure("by_process", max, "by_process_at_s"),
     Figure("by_weight", max, "by_weight_at_s"),
     Figure("by_closure", max, ""),

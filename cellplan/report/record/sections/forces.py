@@ -15,6 +15,8 @@ class JointLoadRecord(TypedDict):
     unit: Annotated[str, "`Nm` or `N`"]
     torque: Annotated[Number, "largest size by processes and weights together, as far as they are stated"]
     torque_at_s: Annotated[Number, "its time"]
+    moving: Annotated[Number, "likewise, and by the accelerations of tool and part in the written motion"]
+    moving_at_s: Annotated[Number, "its time"]
     by_process: Annotated[Number, "largest size by processes alone"]
     by_process_at_s: Annotated[Number, "its time"]
     by_weight: Annotated[Number, "largest size by weights of tool and part alone; null if one is not stated"]
@@ -104,6 +106,8 @@ def _joint(load: JointLoad) -> JointLoadRecord:
         "unit": load.unit.name,
         "torque": number(load.total.size),
         "torque_at_s": number(load.total.at_s),
+        "moving": number(load.moving.size),
+        "moving_at_s": number(load.moving.at_s),
         "by_process": number(load.by_process.size),
         "by_process_at_s": number(load.by_process.at_s),
         "by_weight": None if load.by_weight is None else number(load.by_weight.size),
