@@ -19,7 +19,7 @@ from cellplan.session.blocks import Block
 from cellplan.session.figures import WITHIN, Figure, Loads, clearance_figures, joint_figures
 from cellplan.session.judge import Judgement
 from cellplan.session.motion import LiveMotion
-from cellplan.session.seams import branch_figures, seam_figures
+from cellplan.session.seams import branch_figures, depth_figures, seam_figures
 
 PLANNED: Final = "planned"
 BREAKS_OFF: Final = "breaks off"
@@ -47,12 +47,15 @@ class Look:
         figures = [*joint_figures(block.cell, motion, loads)]
         if motion.is_begun:
             figures += clearance_figures(block, motion, WITHIN if near is None else near.spare)
-            figures += [*seam_figures(block, motion), *branch_figures(block, motion)]
+            figures += [*seam_figures(block, motion), *branch_figures(block, motion), *depth_figures(block, None)]
         return cls(block=block, motion=motion, loads=loads, figures=tuple(figures))
 
     def judged(self, judgement: Judgement) -> "Look":
         """The same with what is known at rest."""
-        return replace(self, judgement=judgement, figures=tuple(_reported(it, judgement) for it in self.figures))
+        figures = [_reported(it, judgement) for it in self.figures]
+        if judgement.report is not None:
+            figures = [it for it in figures if it.name != "tool depth"] + [*depth_figures(self.block, judgement.report)]
+        return replace(self, judgement=judgement, figures=tuple(figures))
 
     @property
     def spare(self) -> float:
@@ -102,6 +105,7 @@ class Look:
             "state": self.state,
             "verdict": f"{self.state}: {self.words}",
             "figures": [figure.record for figure in self.figures],
+            "reasons": [] if self.judgement is None else [*self.judgement.lines],
             "lost_at": motion.lost_at,
             "motion": motion_record(motion.times, motion.q, []),
             "worst": {

@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from cellplan.errors import InputError
+from cellplan.files.input.findings import shown
 from cellplan.report.record.common import Record
 from cellplan.scene.scene import Scene
 from cellplan.session.actions import Actions
@@ -69,12 +70,13 @@ class Session(AbstractContextManager["Session"]):
             number: Of the change, repeated in the answer.
 
         Raises:
-            InputError: An address is not that of a variable, it is locked, or a value is out of its range.
+            InputError: An address is not that of a variable, it is locked, or a value is no number of its range.
         """
         engine = self._engine
+        if not isinstance(block, int | None):
+            raise InputError(f"block: expected the number of one, got {shown(block)}")
         accepted = {
-            address: engine.given.variables.variable(address).accepted(float(value))
-            for address, value in values.items()
+            address: engine.given.variables.variable(address).accepted(value) for address, value in values.items()
         }
         self._number = number
         engine.move({**engine.values, **accepted}, block)
@@ -116,6 +118,8 @@ class Session(AbstractContextManager["Session"]):
             InputError: There is no such action, or it is refused.
         """
         document, changes, actions = self.document, self.document.changes, self._actions
+        if not isinstance(argument, int | float | None):
+            raise InputError(f"{action}: expected a number with it, got {shown(argument)}")
         if action in {"save", *KINDS}:
             _write_starts(document, self._engine.starts(of_all=True))
         values: dict[str, Callable[[], Record | None]] = {

@@ -3,11 +3,13 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from numbers import Real
 from typing import Any, Final
 
 import numpy as np
 
 from cellplan.errors import InputError
+from cellplan.files.input.findings import shown
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.repair.neat import written_at
 from cellplan.model.cell.cell import Cell, Robot
@@ -47,18 +49,20 @@ class Variable:
     is_locked: bool = False  # whether ``layout.fixed`` of the cell names it
     is_varied: bool = False  # whether ``layout.vary`` of the cell states its range
 
-    def accepted(self, value: float) -> float:
+    def accepted(self, value: object) -> float:
         """A value that may stand there; others are refused.
 
         Raises:
-            InputError: The variable is locked, or the value is not finite or out of its range.
+            InputError: The variable is locked, or the value is no finite number or out of its range.
         """
         if self.is_locked:
             raise InputError(f"{self.address}: is locked by layout.fixed of the cell; take it out there")
-        if not math.isfinite(value) or not self.lower <= value <= self.upper:
+        is_number = isinstance(value, Real) and not isinstance(value, bool)
+        number = float(value) if isinstance(value, Real) and is_number else math.nan
+        if not self.lower <= number <= self.upper:
             expected = f"a number from {self.lower:g} to {self.upper:g} {self.unit}"
-            raise InputError(f"{self.address}: expected {expected}, got {value:g}")
-        return value
+            raise InputError(f"{self.address}: expected {expected}, got {f'{number:g}' if is_number else shown(value)}")
+        return number
 
     def record(self, *, value: float) -> dict[str, Any]:
         """The variable with its present value, for pages."""

@@ -44,6 +44,7 @@ class FakeSession:
     state: str = "planned"
     delay_s: float = 0.0
     refusal: str = ""
+    reasons: list[str] = field(default_factory=list)
 
     def change(self, values: Mapping[str, float], block: int | None) -> Record:
         """Take values; nothing is certified then."""
@@ -65,7 +66,8 @@ class FakeSession:
         answer |= {
             "version": self.version,
             "state": self.state,
-            "verdict": "left/C leaves its range" if is_lost else "all limits hold",
+            "verdict": " ".join(["left/C leaves its range", *self.reasons]) if is_lost else "all limits hold",
+            "reasons": self.reasons if is_lost else [],
             "lost_at": 0.6 if is_lost else None,
             "block": answer["block"] if block is None else block,
             "figures": [_margin(sum(values.values()), is_met=not is_lost)],

@@ -246,6 +246,19 @@ def test_a_job_that_breaks_off_is_red_with_the_time_to_which_it_gets(page: Brows
     assert (row, float(hit)) == ("mark", 600.0)
 
 
+@pytest.mark.parametrize("reasons", [["first", "second"], ["far " * 200], []])
+def test_all_reasons_are_to_be_read_whatever_the_line_at_the_top_has_room_for(
+    page: Browser, session: FakeSession, reasons: list[str]
+) -> None:
+    session.reasons = reasons
+    page.run(f"app.change({{ 'robots.right.base.x_mm': {LOST_FROM + 1} }}); {IDLE}")
+    listed = page.run("return [...byId('reasons').children].map((item) => item.textContent.trim());")
+
+    assert listed == (reasons if len(reasons) != 1 else [f"left/C leaves its range {reasons[0]}".strip()])
+    page.run(f"app.change({{ 'robots.right.base.x_mm': 0 }}); {IDLE}")
+    assert page.text("reasons") == ""
+
+
 def test_advice_is_an_arrow_and_a_button_that_moves_the_base(page: Browser, session: FakeSession) -> None:
     before = session.record["answer"]["values"]["robots.right.base.y_mm"]
     start, end = page.run("return app.overlay.arrowEnds(app.answer.advice[0]);")

@@ -18,6 +18,7 @@ class Figures {
     byId("settling").textContent = answer.is_settled ? "" : "…";
     if (answer.is_settled) byId("spoken").textContent = `${answer.state}: ${answer.verdict}`;
     byId("figures").replaceChildren(...answer.figures.map((figure) => this.row(figure)));
+    this.showReasons(answer);
     this.showAdvice(answer);
     this.showStrip(answer);
     const lines = answer.history.join("\n");
@@ -25,6 +26,16 @@ class Figures {
     for (const [name, can] of Object.entries(answer.can)) byId(name).disabled = !can;
     byId("saved").textContent = answer.is_saved ? "saved" : "not saved";
     byId("figures").dataset.number = this.app.client.answered; // last: what watches it sees the rest
+  }
+
+  /** At rest all that fails, where the line at the top has only the first or cannot be seen as a whole. */
+  showReasons(answer) {
+    const [list, line] = [byId("reasons"), byId("verdict")];
+    list.classList.toggle("old", !answer.is_settled);
+    if (!answer.is_settled) return;
+    const isCut = line.scrollHeight > line.clientHeight + 1;
+    const reasons = answer.reasons.length > 1 ? answer.reasons : isCut ? [line.textContent] : [];
+    list.replaceChildren(...reasons.map((textContent) => element("li", { textContent })));
   }
 
   /** One figure; pressed, it leads to its instant and marks the bodies that it names. */
