@@ -89,9 +89,9 @@ def _advised(look: Look, variables: LiveVariables) -> Iterator[list[Record] | No
     records = list[Record]()
     for robot, base in enumerate(look.block.cell.robots):
         columns = _columns(variables, base.name)
-        step = _best(program, columns, len(motion.x))
-        if step is not None and (length := float(np.linalg.norm(step * problem.scale))) >= SHORTEST:
-            dx = step * problem.scale
+        steps = variables.ties.steps(variables.layout.tied.ranges, columns)
+        dx = _best(program, columns, steps, problem.scale)
+        if dx is not None and (length := float(np.linalg.norm(dx[columns]))) >= SHORTEST:
             direction = np.zeros(3)
             for column in columns:
                 direction[variables.layout.tied.ranges[column].index] = dx[column] / length
@@ -113,13 +113,28 @@ def _columns(variables: LiveVariables, robot: str) -> list[int]:
     ]
 
 
-def _best(program: LinearProgram, columns: list[int], count: int) -> Array | None:
-    """The best step of some variables alone, in usual steps, shape (n,); None where there is none."""
-    may_move = np.zeros(len(program.box[0]), dtype=bool)
-    may_move[columns] = True
-    lower, upper = (np.where(may_move, side, 0.0) for side in program.box)
-    solved = replace(program, box=(lower, upper)).priced(program.price).solve() if columns else None
-    return None if solved is None else solved.z[:count]
+def _best(program: LinearProgram, columns: list[int], steps: Array, scale: Array) -> Array | None:
+    """The best step of some variables alone, with those that follow them; None where there is none.
+
+    Args:
+        steps: What steps make of all variables, see ``Ties.steps``.
+        scale: Usual steps, shape (n,).
+
+    Returns:
+        The step in [m] and [rad], shape (n,).
+    """
+    count = len(scale)
+    whole = np.eye(len(program.box[0]))  # the step has further parts where a motion is timed anew
+    whole[:count, :count] = steps * scale / scale[:, None]
+    lower, upper = (np.where(np.isin(np.arange(len(whole)), columns), side, 0.0) for side in program.box)
+    for column in columns:
+        for other in np.flatnonzero(whole[:count, column]).tolist():
+            ends = sorted(side[other] / whole[other, column] for side in program.box)
+            lower[column], upper[column] = max(lower[column], ends[0]), min(upper[column], ends[1])
+    rows = [replace(row, gradients=row.gradients @ whole) for row in program.rows]
+    program = replace(program, rows=rows, box=(lower, upper))
+    solved = program.priced(program.price).solve() if columns else None
+    return None if solved is None else (whole[:count, :count] @ solved.z[:count]) * scale
 
 
 def _record(robot: int, direction: Array, length: float, gains: dict[str, float]) -> Record:

@@ -65,7 +65,7 @@ class Session(AbstractContextManager["Session"]):
         """Set values, and say what becomes of the block that is shown.
 
         Args:
-            values: New values in file units by address.
+            values: New values in file units by address; what the layout ties to them follows.
             block: Number of the block to be shown; None for the one that is.
             number: Of the change, repeated in the answer.
 
@@ -75,9 +75,7 @@ class Session(AbstractContextManager["Session"]):
         engine = self._engine
         if not isinstance(block, int | None):
             raise InputError(f"block: expected the number of one, got {shown(block)}")
-        accepted = {
-            address: engine.given.variables.variable(address).accepted(value) for address, value in values.items()
-        }
+        accepted = engine.given.variables.accepted(values)
         self._number = number
         engine.move({**engine.values, **accepted}, block)
         if accepted:

@@ -22,6 +22,7 @@ from cellplan.search.variables.state import State
 from cellplan.search.variables.ties import Tied
 from cellplan.search.variables.variables import Variables
 from cellplan.search.variables.written import written_number
+from cellplan.session.ties import Ties
 
 POSE: Final = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")
 LEANING: Final = (3, 4)  # places of its roll and pitch
@@ -75,6 +76,7 @@ class LiveVariables:
 
     listed: tuple[Variable, ...]  # in file units, those of the layout first
     layout: Variables  # the same numbers in [m] and [rad], without those of obstacles
+    ties: Ties  # which of them follow each other
 
     @classmethod
     def of(cls, cell: Cell) -> "LiveVariables":
@@ -84,9 +86,10 @@ class LiveVariables:
         numbers = state.numbers(cell, ranges).tolist()
         ranges = [replace(it, given=number) for it, number in zip(ranges, numbers, strict=True)]
         stated = {} if cell.layout is None or cell.layout.is_default else {it.address: it for it in cell.layout.ranges}
-        bounded = leaving_columns(cell, [_bounded(cell, it, stated) for it in ranges])
+        ties = Ties.of(cell)
+        bounded = leaving_columns(cell, [ties.narrowed(_bounded(cell, it, stated)) for it in ranges])
         listed = [_listed(cell, it, is_varied=it.address in stated) for it in bounded]
-        return cls(listed=(*listed, *_of_obstacles(cell)), layout=_layout_variables(cell, bounded))
+        return cls(listed=(*listed, *_of_obstacles(cell)), layout=_layout_variables(cell, bounded), ties=ties)
 
     def at(self, address: str) -> Variable | None:
         """The variable at an address; None where it is not listed."""
@@ -101,6 +104,20 @@ class LiveVariables:
         if (variable := self.at(address)) is None:
             raise InputError(f"{address}: expected the address of a number that may be changed, got another one")
         return variable
+
+    def accepted(self, values: Mapping[str, object]) -> dict[str, float]:
+        """New values in file units by address, with those of the numbers that follow them; others are refused.
+
+        Raises:
+            InputError: An address is not that of a variable, it is locked, or a value is no number of its range.
+        """
+        accepted = {address: self.variable(address).accepted(value) for address, value in values.items()}
+        for address, value in [*accepted.items()]:
+            for follower in self.ties.followers(address):
+                other, scale = follower.variable, DEG if follower.variable.is_angle else MM
+                if other.address not in values and (listed := self.at(other.address)) is not None:
+                    accepted[other.address] = listed.accepted(written_number(other, follower.value(value / scale)))
+        return accepted
 
     def written(self, cell: Cell) -> dict[str, float]:
         """Values in file units of a changed cell by address, as far as they are others than here."""
