@@ -14,7 +14,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.units import MM
 from cellplan.report.record.common import Record
 from cellplan.report.record.figures import figures_of
-from cellplan.scene.bodies import is_ground, scene_bodies
+from cellplan.scene.bodies import Kind, SceneBody, is_ground, scene_bodies
 from cellplan.session.blocks import Block
 from cellplan.session.figures import WITHIN, Figure, Loads, clearance_figures, joint_figures
 from cellplan.session.judge import Judgement
@@ -147,7 +147,8 @@ def poses(cell: Cell, given: Mapping[str, Array]) -> Record:
 
     Args:
         cell: The cell as its variables have it.
-        given: Poses of the bodies in the scene that the page was given, in its order, by name.
+        given: Poses of the bodies in the scene that the page was given, in its order, by name. Of them only rods and
+            obstacles may be elsewhere.
     """
     bodies = sorted(scene_bodies(cell), key=is_ground)
     places = {name: place for place, name in enumerate(given)}
@@ -157,10 +158,17 @@ def poses(cell: Cell, given: Mapping[str, Array]) -> Record:
         "bodies": {
             str(places[body.name]): numbers(body.X_BS)
             for body in bodies
-            if body.name in places and not np.array_equal(body.X_BS, given[body.name])
+            if body.name in places and _may_be_elsewhere(cell, body)
         },
         "part": place_record(cell, 0.0)["pose"],
     }
+
+
+def _may_be_elsewhere(cell: Cell, body: SceneBody) -> bool:
+    """Whether a body may have another pose on its link, or in the world, than pages were given at some time."""
+    if body.kind is Kind.OBSTACLE:
+        return not is_ground(body)
+    return body.kind is Kind.TOOL and body.robot is not None and cell.robot(body.robot).tool.rod is not None
 
 
 def numbers(X: Array) -> list[float]:
