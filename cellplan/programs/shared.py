@@ -48,8 +48,7 @@ class Shared:
         """The result kept for a key, which states all that it depends on besides the run, or else made now."""
         if key not in self._results:
             self._results[key] = make()
-        known: Result = self._results[key]
-        return known
+        return self._results[key]
 
 
 def played_digest(played: ExecutedProgram) -> str:

@@ -8,7 +8,6 @@ from typing import Final, cast
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.files.cell.outline_runs import with_run_points
 from cellplan.files.cell.paths.csv_table import METRES_PER_MM
 from cellplan.files.cell.paths.dxf import DrawingSettings, FlatDrawing, read_drawing, require_dxf
 from cellplan.files.cell.referenced_files import Sources
@@ -20,7 +19,8 @@ from cellplan.files.schema.programmed import OutlineEntry
 from cellplan.files.schema.task import TaskEntry
 from cellplan.files.shapes import centred_solid, direction
 from cellplan.geometry.arrays import Array, Flags
-from cellplan.geometry.curves.flat_curves import Contour, begun_near
+from cellplan.geometry.curves.extension import Tail
+from cellplan.geometry.curves.flat_curves import WIDEST_STEP, Contour, begun_near
 from cellplan.geometry.curves.placed_contours import SURFACE, Ground, drawing_pose, place_contours
 from cellplan.geometry.curves.seam_line import SeamAngles, SeamLine, tool_targets
 from cellplan.geometry.projection import projection_onto
@@ -28,12 +28,13 @@ from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.step.outlines import FaceError, Outline, PlacedOutline, place_on_step
 from cellplan.geometry.step.part import StepPart
 from cellplan.guard import Guard, in_child
-from cellplan.model.settings.runs import AUTO
+from cellplan.model.settings.runs import AUTO, RunsEntry
 from cellplan.model.settings.task import ProcessEntry
 from cellplan.model.settings.units import Deg, Mm, in_si
 from cellplan.model.task.task import ProgrammedPath
 
 SAME_POINT: Final = 1e-6  # [m] points that are nearer than this are one
+LIFT_SIDES: Final = 48  # straight sides of a run that is lifted
 NO_JUMP: Final = np.deg2rad(0.1)  # [rad] between the tool axes on both sides of a corner
 
 
@@ -169,7 +170,7 @@ def _with_runs(
 ) -> tuple[Array, Array, Flags]:
     """Tool tips and axes along a line with the runs of its process, and which sides these are."""
     points, axes = _targets_along(line, angles, entry)
-    return with_run_points(points, axes, line.tangents[[0, -1]], runs=process, chord=entry.chord_mm.si)
+    return _with_run_points(points, axes, line.tangents[[0, -1]], runs=process, chord=entry.chord_mm.si)
 
 
 def _by_distance(lines: Sequence[SeamLine]) -> list[SeamLine]:
@@ -206,3 +207,48 @@ def _targets_along(line: SeamLine, angles: SeamAngles, entry: OutlineEntry) -> t
     far = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME_POINT)
     far[-2:] = [far[-2] and (far[-1] or len(far) == 2), True]  # the end stays
     return points[far], axes[far]
+
+
+def _with_run_points(
+    points: Array, axes: Array, tangents: Array, *, runs: RunsEntry, chord: float
+) -> tuple[Array, Array, Flags]:
+    """A contour with its runs, and which of its sides they are.
+
+    Args:
+        points: Tool tips along it in [m], shape (N, 3), expressed in P.
+        axes: Unit tool axes into the part, shape (N, 3), which stay on the runs as they are at the ends.
+        tangents: Unit directions of travel at both ends, shape (2, 3).
+        runs: What is stated of its runs.
+        chord: Largest distance in [m] of an arc from its straight sides.
+
+    Returns:
+        Points and axes, shape (M, 3) each, and whether each side is one of a run, shape (M - 1,).
+    """
+    first, last = runs.has_runs
+    before = _run((points[0], tangents[0], axes[0]), runs, sign=-1.0, chord=chord)[::-1] if first else points[:0]
+    behind = _run((points[-1], tangents[1], axes[-1]), runs, sign=1.0, chord=chord) if last else points[:0]
+    is_run = np.repeat([True, False, True], [len(before), len(points) - 1, len(behind)])
+    held = np.concatenate([np.tile(axes[0], (len(before), 1)), axes, np.tile(axes[-1], (len(behind), 1))])
+    return np.concatenate([before, points, behind]), held, is_run
+
+
+def _run(end: tuple[Array, Array, Array], runs: RunsEntry, *, sign: float, chord: float) -> Array:
+    """Points of a run from the end of the work on, without it; ``end`` has tip, tangent and tool axis there."""
+    p, along, axis = end
+    across = np.sign(runs.arc) * np.cross(along, axis)
+    tail = Tail(
+        p=p,
+        dp=along,
+        side=across / max(float(np.linalg.norm(across)), np.finfo(float).tiny),
+        normal=-axis,
+        straight=runs.straights[0 if sign < 0.0 else 1],
+        arc=abs(runs.arc),
+        lift=runs.lift_mm.si,
+        sign=sign,
+    )
+    arc = 0.5 * np.pi * tail.arc
+    widest = min(WIDEST_STEP, 2.0 * float(np.arccos(1.0 - min(1.0, chord / tail.arc)))) if arc else np.inf
+    places = np.union1d(np.linspace(0.0, arc, 1 + int(np.ceil(0.5 * np.pi / widest))), [tail.length])
+    if tail.lift:
+        places = np.union1d(places, np.linspace(0.0, tail.length, 1 + LIFT_SIDES))
+    return tail.evaluate(sign * places[1:])[0]

@@ -58,8 +58,7 @@ def drawing_pose(direction: Array, height: float, X_FD: Array) -> Array:
             or +y where the drawing is seen along x.
     """
     hint = np.array([0.0, 1.0, 0.0] if abs(direction[0]) > ALONG_X else [1.0, 0.0, 0.0])
-    X_PD: Array = pose_from(frame_from_axes(direction, hint), height * direction) @ X_FD
-    return X_PD
+    return pose_from(frame_from_axes(direction, hint), height * direction) @ X_FD
 
 
 @dataclass(slots=True, eq=False)
@@ -165,8 +164,7 @@ def _is_off(samples: _Samples, middle: Projected, chord: float) -> Flags:
     normals = samples.on.normals[behind], middle.normals, samples.on.normals[behind + 1]
     lean = np.maximum(*(np.linalg.norm(n - o, axis=1) for n, o in pairwise(normals)))
     is_long = np.linalg.norm(samples.flat[behind + 1] - samples.flat[behind], axis=1) > SHORTEST_TURN
-    is_off: Flags = (away > chord) | (2.0 * lean > AXIS_STEP) | ((turn > WIDEST_STEP) & is_long)
-    return is_off
+    return (away > chord) | (2.0 * lean > AXIS_STEP) | ((turn > WIDEST_STEP) & is_long)
 
 
 def _refuse_edges(samples: _Samples, is_off: Flags, ground: Ground) -> None:

@@ -89,8 +89,7 @@ def _planned(cell: Cell, stations: Stations, candidate: Candidate, answers: Answ
         names = [holder, *(option.mode.robot for option in candidate)]
         return {name: q[rows][:, cell.columns(name)].tolist() for name in names}
 
-    answer: Configurations | None = answers("block with a moving part", str(values), planned)
-    return answer
+    return answers("block with a moving part", str(values), planned)
 
 
 def _column(candidate: Candidate, planned: Configurations, stations: Stations) -> Column:

@@ -15,7 +15,6 @@ from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import number
 
 SCHEMA: Final = "cellplan.seams/1"
-FLUSH_DEG: Final = 0.0  # work angle of a seam whose walls lie in one plane
 NO_SEAM: Final = "no seam is listed where edges of one are inside the other; correct the drawing"
 MM2: Final = 1e6  # [mm^2/m^2]
 

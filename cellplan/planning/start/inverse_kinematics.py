@@ -78,13 +78,13 @@ def reached_by_rows(
     return np.concatenate(arrived), np.concatenate(places)
 
 
-def damped_move(J: Array, error: Array) -> Array:
-    """Damped Newton moves, shape (B, n), none of their joints by more than ``LONGEST_MOVE``."""
+def damped_move(J: Array, error: Array, longest_move: float = LONGEST_MOVE) -> Array:
+    """Damped Newton moves, shape (B, n), none of their joints by more than ``longest_move`` in [rad] or [m]."""
     J_T = np.swapaxes(J, 1, 2)
     normal = J @ J_T + DAMPING**2 * np.eye(J.shape[1])
     move = (J_T @ np.linalg.solve(normal, error[:, :, None]))[:, :, 0]
-    longest = np.abs(move).max(axis=1, keepdims=True)
-    return move * np.minimum(1.0, LONGEST_MOVE / np.maximum(longest, LONGEST_MOVE))
+    longest = np.abs(move).max(axis=1, keepdims=True, initial=longest_move)
+    return move * (longest_move / longest)
 
 
 def within_limits(model: RobotModel, q: Array) -> Array:

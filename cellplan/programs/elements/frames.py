@@ -53,8 +53,7 @@ def part_pose(frame: ExportFrame, robot: str, task: str, q: Mapping[str, Array])
         return controller_base(frame.robot(robot)) @ station.X
     holder = frame.robot(station.holder)
     X_FP = inverse(on_flange(holder, np.eye(4))) @ station.X
-    X_WP: Array = holder.X_WB @ carried_poses(holder, q[holder.name], X_FP)
-    return X_WP
+    return holder.X_WB @ carried_poses(holder, q[holder.name], X_FP)
 
 
 def require_frame_numbers(robot: Robot, stations: Sequence[Station], *, needed: tuple[int, int] | None = None) -> None:

@@ -105,8 +105,7 @@ def exact_numbers(robot: Robot, q: Array, *, angle: Angle = Angle.DEGREES) -> Ar
     """Positions of the controller in the units of a file, not rounded, of the model in [rad] or [m], shape (N, n)."""
     joints = robot.model.joints
     scale = np.array([1.0 if angle is Angle.RADIANS else joint.display_unit.scale for joint in joints])
-    numbers: Array = _zero(robot).from_model(q) * scale
-    return numbers
+    return _zero(robot).from_model(q) * scale
 
 
 def from_numbers(robot: Robot, numbers: Array, *, angle: Angle = Angle.DEGREES) -> Array:

@@ -66,8 +66,7 @@ def are_near(times: Array, others: Sequence[float] | Array, tolerance: float) ->
     """Which times, shape (N,), are the same as one of some others."""
     ordered = np.sort(np.array([-np.inf, *others, np.inf]))
     after = np.searchsorted(ordered, times)
-    near: Flags = np.minimum(ordered[after] - times, times - ordered[after - 1]) <= tolerance
-    return near
+    return np.minimum(ordered[after] - times, times - ordered[after - 1]) <= tolerance
 
 
 def require_paths(files: Mapping[str, str], expected: Collection[str]) -> None:

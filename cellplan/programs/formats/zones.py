@@ -45,8 +45,7 @@ def tool_tips(robot: Robot, q: Array) -> Array:
 def on_scale(sizes: Array, scale: Sequence[int]) -> NDArray[np.int_]:
     """The largest of a scale that is no larger than each size, 0 where none is, shape (N,)."""
     whole = np.array([0, *scale])
-    taken: NDArray[np.int_] = whole[np.searchsorted(whole, sizes, side="right") - 1]
-    return taken
+    return whole[np.searchsorted(whole, sizes, side="right") - 1]
 
 
 def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
@@ -91,8 +90,7 @@ def axis_zones(robot: Robot, q: Array, share: Array | float) -> Array:
     Rows ``q`` are in [rad] or [m], shape (N, n); shares 0 to 0.5, of all rows or of each, shape (N,).
     """
     travels = _axis_travels(robot, q)
-    zones: Array = share * np.min(np.max(np.where(np.isfinite(travels), travels, 0.0), axis=2), axis=0)
-    return zones
+    return share * np.min(np.max(np.where(np.isfinite(travels), travels, 0.0), axis=2), axis=0)
 
 
 def axis_shares(robot: Robot, q: Array, turns: Array, slides: Array) -> Array:
@@ -127,8 +125,7 @@ def shares_off_seams(moves: Sequence[Move], rows: RobotRows) -> Array:
 
 def _away(robot: Robot, tips: Array, q: Array, other: Array, share: Array) -> Array:
     """Distance of the tool from its tips in some rows, a share on the way to others, in [m], shape (N,)."""
-    away: Array = np.linalg.norm(tool_tips(robot, q + share[:, None] * (other - q)) - tips, axis=1)
-    return away
+    return np.linalg.norm(tool_tips(robot, q + share[:, None] * (other - q)) - tips, axis=1)
 
 
 def _axis_travels(robot: Robot, q: Array) -> Array:

@@ -126,8 +126,7 @@ class PathRows:
     def depth_off(self, task: Task) -> Array:
         """By how much deeper a tool may be for it at each time in [m], shape (M,): as far as any point of it moves."""
         off = self.tool_off(task)
-        depths: Array = off[:, 0] + tool_reach(self.scene.cell, task.robot) * off[:, 1]
-        return depths
+        return off[:, 0] + tool_reach(self.scene.cell, task.robot) * off[:, 1]
 
 
 def path_rows(played: ExecutedProgram, stretch: ExecutedStretch, shared: Shared) -> PathRows:

@@ -299,5 +299,4 @@ def _rounded_at(row_times: Array, shares: Array, times: Array) -> Flags:
 
 def _largest_within(most: Array, ladder: Array) -> Array:
     """The largest of the shares that are tried, by rising size, and not larger than each."""
-    largest: Array = ladder[np.maximum(np.searchsorted(ladder, most, side="right") - 1, 0)]
-    return largest
+    return ladder[np.maximum(np.searchsorted(ladder, most, side="right") - 1, 0)]

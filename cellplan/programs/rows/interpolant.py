@@ -33,16 +33,14 @@ class HermiteRows:
         k, u = self._places(times)
         h, chord = self._steps[k], np.diff(self.q, axis=0)[k]
         first, last = h * self.qd[k] - chord, h * self.qd[k + 1] - chord
-        positions: Array = self.q[k] + u * chord + u * (1.0 - u) * ((1.0 - u) * first - u * last)
-        return positions
+        return self.q[k] + u * chord + u * (1.0 - u) * ((1.0 - u) * first - u * last)
 
     def largest_accelerations(self) -> Array:
         """Largest second derivative between two rows in [rad/s^2] or [m/s^2], without its sign, shape (N - 1, n)."""
         s = np.diff(self.q, axis=0) / self._steps
         begin = np.abs(6.0 * s - 4.0 * self.qd[:-1] - 2.0 * self.qd[1:])
         end = np.abs(6.0 * s - 2.0 * self.qd[:-1] - 4.0 * self.qd[1:])
-        largest: Array = np.maximum(begin, end) / self._steps
-        return largest
+        return np.maximum(begin, end) / self._steps
 
     def extremes(self) -> tuple[Array, Array]:
         """Smallest and largest position between two rows, both included, shape (N - 1, n) each."""
@@ -108,5 +106,4 @@ def row_velocities(times: Array, q: Array, *, rests: Flags, lower: Array, upper:
 
 def _is_monotone(qd: Array, s: Array) -> Flags:
     """Whether speeds lie between zero and three times those of chords."""
-    is_monotone: Flags = (qd * s >= 0.0) & (np.abs(qd) <= MONOTONE * np.abs(s))
-    return is_monotone
+    return (qd * s >= 0.0) & (np.abs(qd) <= MONOTONE * np.abs(s))

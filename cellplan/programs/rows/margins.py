@@ -65,10 +65,7 @@ def corners_at(rows: RobotRows, shares: Array, times: Array) -> Array:
         np.where(share > 0.0, 1.0 - offset / np.maximum(share, SHORTEST), 0.0)
         for share, offset in ((shares[step], u), (shares[step + 1], 1.0 - u))
     )
-    between: Array = (
-        np.maximum(before, 0.0)[:, None] * largest[step] + np.maximum(after, 0.0)[:, None] * largest[step + 1]
-    )
-    return between
+    return np.maximum(before, 0.0)[:, None] * largest[step] + np.maximum(after, 0.0)[:, None] * largest[step + 1]
 
 
 def all_corners(played: ExecutedProgram, times: Array) -> Array:
@@ -102,8 +99,7 @@ def row_tube(rows: RobotRows) -> Array:
     """How far the tip of its tool and the joints of a robot may be off at its rows in its tube, shape (N, 2 + n)."""
     if rows.tube is None:
         return np.zeros((len(rows), 2 + rows.q.shape[1]))
-    tube: Array = np.max([np.pad(rows.tube[:, 2:], ends) for ends in (FIRST, LAST)], axis=0)
-    return tube
+    return np.max([np.pad(rows.tube[:, 2:], ends) for ends in (FIRST, LAST)], axis=0)
 
 
 def tubes_at(played: ExecutedProgram, times: Array) -> dict[str, Array]:
@@ -138,8 +134,7 @@ def off_chords(played: ExecutedProgram, times: Array) -> Array:
 
 def in_steps(corners: Array) -> Array:
     """No joint is off by more in each step, from what it may be off at the times, shape (M, nq), shape (M - 1, nq)."""
-    off: Array = np.maximum(np.abs(corners[:-1]), np.abs(corners[1:]))
-    return off
+    return np.maximum(np.abs(corners[:-1]), np.abs(corners[1:]))
 
 
 def tool_margins(arms: LeverArms, scene: Scene, relation: Relation, off: Array) -> Array:
@@ -194,8 +189,7 @@ def _changes(arms: LeverArms, scene: Scene, relation: Relation, q: Array, corner
     moved = arms.steps(q) + off
     mixed = [0.5 * (bend(moved + off) - bend(moved) - bend(off)) for bend in (chain.bend, chain.turn_bend)]
     steps = np.pad(np.stack(mixed, axis=1), ((1, 1), (0, 0)))
-    changes: Array = np.maximum(steps[:-1], steps[1:])
-    return changes
+    return np.maximum(steps[:-1], steps[1:])
 
 
 def holder_of(scene: Scene, relation: Relation) -> str | None:

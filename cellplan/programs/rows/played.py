@@ -125,8 +125,7 @@ class ExecutedProgram:
     def run_times(self) -> Array:
         """Times of the rows of the run in the played program, in [s]."""
         tables = list(self.run.programs.values())[self.place]
-        times: Array = next(iter(tables.values())).times + self.lead
-        return times
+        return next(iter(tables.values())).times + self.lead
 
     def stretches(self) -> Iterator[ExecutedStretch]:
         """All phases in their order, those of all cycles."""

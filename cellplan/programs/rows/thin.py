@@ -233,5 +233,4 @@ def chosen_rows(scene: Scene, rows: RobotRows, chosen: Indices) -> RobotRows:
 def _ends_of_standstill(q: Array) -> Flags:
     """Rows at which all robots of a group come to rest or leave it, shape (N,)."""
     still = np.concatenate([[False], np.all(np.diff(q, axis=0) == 0.0, axis=1), [False]])
-    ends: Flags = still[1:] != still[:-1]
-    return ends
+    return still[1:] != still[:-1]

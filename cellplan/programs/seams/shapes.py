@@ -80,8 +80,7 @@ class Shape:
 
     def rule_margins(self, shares: Array) -> Array:
         """Largest difference of any rule of orientation at shares of its length in [rad], shape (N,)."""
-        margins: Array = 4.0 * shares * (1.0 - shares) * self.rule_margin
-        return margins
+        return 4.0 * shares * (1.0 - shares) * self.rule_margin
 
 
 def line(start: Array, end: Array) -> Shape:

@@ -87,13 +87,6 @@ def clock_from(cell: Cell) -> str:
     return GIVEN if abs(steps - round(steps)) <= STEP_TOL * max(steps, 1.0) else NEXT_STEP
 
 
-class IdleRecord(TypedDict):
-    """Idle robots and missing moves."""
-
-    idle: list[str]
-    not_in_program: list[str]
-
-
 def missing_moves(cell: Cell, runs: Mapping[str | None, Iterable[str]]) -> list[str]:
     """Lines on moves that the programs of several runs do not contain, each with the name of its run.
 

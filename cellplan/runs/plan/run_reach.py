@@ -88,5 +88,4 @@ def _beyond_reach(cell: Cell, task: Task, X_PT: Array) -> tuple[float, float]:
 def _first_point(robot: Robot) -> Array:
     """The point of the first axis of a robot in the world in [m], shape (3,)."""
     axis = robot.model.axes[robot.model.links_to_flange[0]]
-    point: Array = robot.X_WB[:3, :3] @ axis.point_B + robot.X_WB[:3, 3]
-    return point
+    return robot.X_WB[:3, :3] @ axis.point_B + robot.X_WB[:3, 3]

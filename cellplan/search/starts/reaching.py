@@ -13,7 +13,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.transforms import inverse, pose_from, rotation_about
 from cellplan.model.cell.cell import Relation, Robot
-from cellplan.planning.start.inverse_kinematics import finite_limits, tip_jacobian
+from cellplan.planning.start.inverse_kinematics import damped_move, finite_limits, tip_jacobian
 from cellplan.planning.tracking.cooperation_jacobian import pose_errors
 from cellplan.planning.tracking.task_constraints import constraint_rows
 from cellplan.scene.kinematics.screw_chain import ScrewChain
@@ -24,7 +24,6 @@ ITERATIONS: Final = 25  # most draws that arrive at all do so in 6 to 12
 TRIAL: Final = 10  # iterations after which draws that are still far away are given up
 FAR: Final = 0.05  # [m, rad] far away
 LONGEST_MOVE: Final = 0.5  # [rad, m] largest change in one iteration
-DAMPING: Final = 1e-3  # keeps steps finite at singular configurations
 STEPS: Final = 5  # of Newton's method from node to node at most; one or two but at corners
 NEARLY: Final = 1e-3  # [m, rad] an error that one step more leaves nothing of
 LOST: Final = 0.6  # [rad, m] a joint that moves more than this from one node to the next has jumped
@@ -133,7 +132,7 @@ def reached(arm: FreeArm, goal: Goal, bounds: BaseBounds, draws: PlacedDraws) ->
         at = at[going_on]
         if not len(at):
             break
-        move = _damped(J[going_on], error[going_on])
+        move = damped_move(J[going_on], error[going_on], LONGEST_MOVE)
         joints = q.shape[1]
         q[at] = np.clip(q[at] + move[:, :joints], arm.lower, arm.upper)
         _move_bases(X_WB, at, move[:, joints:], bounds)
@@ -178,7 +177,7 @@ def _corrected(arm: FreeArm, goal: Goal, node: int, draws: PlacedDraws) -> tuple
     fixed = np.zeros(4, dtype=bool)
     for _ in range(STEPS):
         error, J = _linearised(arm, goal, node, replace(draws, q=q).of_places(at), fixed)
-        q[at] += _damped(J, error)
+        q[at] += damped_move(J, error, LONGEST_MOVE)
         arrived = np.abs(error).max(axis=1, initial=0.0) < NEARLY  # before this step, which squares it
         is_near[at[arrived]] = True
         at = at[~arrived]
@@ -210,12 +209,3 @@ def _by_base(goal: Goal, X_WB: Array, X_BT: Array) -> Array:
     twists[:, :3, 3], twists[:, 3:, 3] = np.cross(UP, away), UP
     to_R = goal.X_WR[:3, :3].T
     return np.concatenate([to_R @ twists[:, :3], to_R @ twists[:, 3:]], axis=1)
-
-
-def _damped(J: Array, error: Array) -> Array:
-    """Damped Newton moves, shape (B, n), none of them by more than ``LONGEST_MOVE``."""
-    J_T = np.swapaxes(J, 1, 2)
-    normal = J @ J_T + DAMPING**2 * np.eye(J.shape[1])
-    move = (J_T @ np.linalg.solve(normal, error[:, :, None]))[:, :, 0]
-    longest = np.abs(move).max(axis=1, keepdims=True, initial=0.0)
-    return move * np.minimum(1.0, LONGEST_MOVE / np.maximum(longest, LONGEST_MOVE))

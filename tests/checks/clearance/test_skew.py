@@ -19,7 +19,6 @@ from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.task.task import Frame
-from cellplan.report.text.notes import skew_notes
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
@@ -167,15 +166,6 @@ def test_clocks_of_two_robots_of_which_one_stands_still_limit_nothing() -> None:
 
 def test_a_task_in_the_world_depends_on_no_other_clock() -> None:
     assert skew_of(cell_of(APART), frame=Frame.WORLD).tools == ()
-
-
-def test_notes_are_ascii_and_name_what_limits() -> None:
-    lines = skew_notes(skew_of(cell_of(APART, skews={"a": 8.0})))
-
-    assert all(line.isascii() for line in lines)
-    assert lines[0] == "allowed skew between any two clocks: 4 ms; of each clock alone: +-2 ms"
-    assert "holder - operator: 4 ms (tool tolerance of work_of_operator), stated 8 ms: NOT KEPT" in lines
-    assert "holder - other: 200 ms or more, stated 8 ms: kept" in lines
 
 
 @pytest.mark.slow

@@ -238,8 +238,7 @@ def _of_distance(standing: Standing, linear: Linear) -> Array:
     if not len(distances.values) or distances.within_robot.all():
         return np.full(linear.derivatives.q.shape[-1], np.nan)
     values = np.where(distances.within_robot, np.inf, distances.values - distances.demands)
-    by_variable: Array = linear.distances[int(values.argmin())]
-    return by_variable
+    return linear.distances[int(values.argmin())]
 
 
 def _highest(crests: PeakValues, by: Array, limits: Array, values: Array) -> Array:

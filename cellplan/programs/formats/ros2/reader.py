@@ -195,5 +195,4 @@ def _rounding(h: Array, slopes: Array) -> Array:
     """By how much rounding may part speeds and slopes around each row, shape (N, n)."""
     slope_error = (TICKS * 10.0**-DECIMALS + np.abs(slopes) / NANO) / h
     padded = np.concatenate([slope_error[:1], slope_error, slope_error[-1:]])
-    both: Array = np.maximum(padded[:-1], padded[1:]) + TICKS * 10.0**-DECIMALS
-    return both
+    return np.maximum(padded[:-1], padded[1:]) + TICKS * 10.0**-DECIMALS
