@@ -44,7 +44,7 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
         qd: Their speeds, shape (N, nq).
     """
     keep_freed_memory()
-    rates = _Rates(job, layout, q, qd, directions)
+    rates = Rates(job, layout, q, qd, directions)
     nq, begins, last = q.shape[1], job.is_begin.tolist(), len(q) - 1
     before = np.zeros((BACK + len(q), 2 * nq, directions.count))  # nodes that there are not, then all nodes
     blocks, states, at = before.reshape(-1, nq * directions.count), before[BACK:], rates.start(directions.start)
@@ -70,18 +70,7 @@ def _shares(job: Job) -> Array:
     return weights.reshape(len(job.steps), -1)
 
 
-def equations(job: Job, layout: Layouts, q: Array, qd: Array, directions: Directions) -> tuple[Array, Array]:
-    """The variational equations at all nodes, joints first, then speeds: see ``differentiate`` for the arguments.
-
-    Returns:
-        What a change of the joints becomes once the tools are back on their paths, and what it does to the speeds,
-        shape (N, 2 nq, nq); and what the directions do, shape (N, 2 nq, p).
-    """
-    rates = _Rates(job, layout, q, qd, directions)
-    return rates.by_joints, rates.by_layout
-
-
-class _Rates:
+class Rates:
     """The variational equations at all nodes.
 
     Attributes:

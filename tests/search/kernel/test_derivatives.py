@@ -10,7 +10,7 @@ from cellplan.geometry.transforms import Array, rotation_exp
 from cellplan.model.cell.cell import Cell
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Linearisation
 from cellplan.planning.tracking.task_constraints import TaskConstraints
-from cellplan.search.kernel.derivatives import differentiate, equations
+from cellplan.search.kernel.derivatives import Rates, differentiate
 from cellplan.search.kernel.figures import MotionFigures
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.run import run
@@ -130,7 +130,8 @@ def test_speeds_of_every_kind_of_cell_change_as_the_equations_say(name: str) -> 
     directions.base[:], directions.tool[:] = rng.normal(size=(2, robots, 6, 6))
     directions.weights[:] = rng.normal(size=(nq, 6)) * 0.1
     _, qd = settled_speeds(job, layout, q)
-    by_joints, by_layout = equations(job, layout, q.T, qd.T, directions)
+    rates = Rates(job, layout, q.T, qd.T, directions)
+    by_joints, by_layout = rates.by_joints, rates.by_layout
     moved = rng.normal(size=(nq, 6))
     expected = (by_joints[0] @ moved + by_layout[0]) * FINE
 
