@@ -57,7 +57,9 @@ def urdf(folder: Path, tip: str, end: str = "", effort: str = "12", **options: b
         '<joint name="to" type="fixed"><parent link="tip"/><child link="end"/><origin xyz="1 0 0"/></joint></robot>\n'
     )
     (folder / "r.urdf").write_text(text, encoding="utf-8")
-    return load_urdf(folder / "r.urdf", UrdfOptions(inertias=options.get("inertias", True))).model
+    robot = load_urdf(folder / "r.urdf", UrdfOptions(inertias=options.get("inertias", True)))
+    assert any("<inertial>" in remark for remark in robot.remarks) is not options.get("inertias", True)
+    return robot.model
 
 
 def test_a_urdf_has_masses_and_torques_where_the_cell_asks_for_them(tmp_path: Path) -> None:
