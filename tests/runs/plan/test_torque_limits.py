@@ -135,3 +135,41 @@ def test_torques_of_retiming_are_those_that_are_checked_with_forces_of_processes
     silent = replace(run.schedule, tasks=())
     without, _ = row_limits(run.scene, silent).torques(times, q, sigma=times)
     assert np.abs(shares - without).max() > 0.1
+
+
+UR5E = """\
+cellplan: 1
+name: loaded
+robots:
+  ur:
+    model: ur5e
+    base: {xyz_mm: [0, 0, 400]}
+    tool: {xyz_mm: [0, 0, 150], mass_kg: 4, geometry: {capsule: {radius_mm: 12, length_mm: 150}}}
+    home_deg: [180, -100, 100, -90, -90, 0]
+    start_deg: auto
+    limits: {shoulder_lift: {torque_nm: 90}, elbow: {torque_nm: 50}}
+part:
+  geometry: {box: {size_mm: [300, 300, 200]}}
+  at: {xyz_mm: [550, 0, 500]}
+tasks:
+  one: {robot: ur, path: {circle: {radius_mm: 60, plane: xy}, project: +z}, tool_axis: normal}
+  two: {robot: ur, path: {circle: {radius_mm: 90, plane: xy}, project: +z}, tool_axis: normal, after: one}
+program: {}
+motion: {mode: part_at_rest, duration_s: 3, step_s: 0.008, timing: fastest}
+acceleration: {full_speed_in_s: 0.12}
+checks: {clearance_mm: 5}
+"""
+
+
+@pytest.mark.slow
+def test_a_program_from_home_to_home_holds_its_torques_in_blocks_and_transfer_moves(tmp_path: Path) -> None:
+    file = tmp_path / "loaded.yaml"
+    file.write_text(UR5E, encoding="utf-8")
+    runs = uncertified(load_cell(file)).runs
+    used = {
+        run.phase.name: max(check.value / check.limit for check in run.report.checks if check.name == "joint_torque")
+        for run in runs
+    }
+    assert len(used) == 5
+    assert max(used.values()) <= 1.0
+    assert min(used[name] for name in ("transfer-1", "work-1", "work-2", "transfer-3")) > 0.85
