@@ -15,7 +15,7 @@ from sections import ONE_THREAD, machine
 
 HERE: Final = Path(__file__).resolve().parent
 PAGE: Final = HERE.parent / "docs/benchmarks.md"
-SCRIPTS: Final = ("peers", "scaling", "screening", "clearance", "dual_robots", "commands")
+SCRIPTS: Final = ("peers", "scaling", "screening", "clearance", "dual_robots", "live_verdicts", "commands")
 HEAD: Final = """# Benchmarks
 
 `make bench` measures all of this anew and writes this page. **Compare ratios**, between two machines or two versions;
