@@ -67,10 +67,10 @@ def _advised(look: Look, variables: LiveVariables) -> Iterator[list[Record] | No
     """An arrow for each base that may move: towards what is missed, else towards a shorter cycle.
 
     They come last, after None for each bounded piece of the work. There are none for a motion that the kernel does not
-    have, or that breaks off.
+    have, that breaks off, or is awaited.
     """
     problem, motion = look.block.problem, look.motion
-    if problem is None or not motion.is_followed or motion.is_planned:
+    if problem is None or not motion.is_followed or motion.is_planned or motion.is_awaited:
         yield []
         return
     is_missed = any(not figure.is_met for figure in look.figures)

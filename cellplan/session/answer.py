@@ -17,7 +17,7 @@ from cellplan.report.record.figures import figures_of
 from cellplan.scene.bodies import Kind, SceneBody, is_ground, scene_bodies
 from cellplan.session.blocks import Block
 from cellplan.session.figures import WITHIN, Figure, Loads, clearance_figures, joint_figures
-from cellplan.session.judge import Judgement
+from cellplan.session.judge import JOB, Judgement, Judgements
 from cellplan.session.motion import LiveMotion
 from cellplan.session.seams import branch_figures, depth_figures, seam_figures
 
@@ -26,13 +26,14 @@ BREAKS_OFF: Final = "breaks off"
 FAILS: Final = "fails"
 CERTIFIED: Final = "certified"
 UNKNOWN: Final = "unknown"
+WORKING_OUT: Final = "working out"
 SHARE_DECIMALS: Final = 5
 TIME_DECIMALS: Final = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Look:
-    """A block at some values: its motion and its figures, and what is known of it at rest."""
+    """A block at some values: its motion and its figures, none while it is awaited, and what is known of it at rest."""
 
     block: Block
     motion: LiveMotion
@@ -44,9 +45,12 @@ class Look:
     def at(cls, block: Block, motion: LiveMotion, near: "Look | None" = None) -> "Look":
         """A block with its motion; one nearby makes it quicker."""
         loads = Loads.of(block.cell, motion)
+        if motion.is_awaited:
+            return cls(block=block, motion=motion, loads=loads, figures=())
         figures = [*joint_figures(block.cell, motion, loads)]
         if motion.is_begun:
-            figures += clearance_figures(block, motion, WITHIN if near is None else near.spare)
+            spare = WITHIN if near is None or near.motion.is_awaited else near.spare
+            figures += clearance_figures(block, motion, spare)
             figures += [*seam_figures(block, motion), *branch_figures(block, motion), *depth_figures(block, None)]
         return cls(block=block, motion=motion, loads=loads, figures=tuple(figures))
 
@@ -67,6 +71,8 @@ class Look:
     def state(self) -> str:
         """Whether its motion breaks off, fails or is planned; without a proof nothing is more than planned."""
         known = self.judgement
+        if known is None and self.motion.is_awaited:
+            return WORKING_OUT
         if (known is None and not self.motion.is_followed) or (known is not None and known.lost):
             return BREAKS_OFF
         if known is not None:
@@ -79,6 +85,8 @@ class Look:
         if self.judgement is not None:
             return self._words_at_rest(self.judgement)
         motion = self.motion
+        if motion.is_awaited:
+            return "the motion is being planned"
         if motion.lost_at is not None:
             lost = f"a tool loses its path at {motion.lost_at:.3f} s"
             return motion.why or (lost if motion.is_begun else "the start of a path is out of reach")
@@ -88,28 +96,22 @@ class Look:
     def _words_at_rest(self, known: Judgement) -> str:
         """The same of what is known at rest."""
         if known.lines:
-            more = f" (and {len(known.lines) - 1} more)" if len(known.lines) > 1 else ""
-            return f"{known.lines[0]}{more}"
+            return several(known.lines)
         if known.lost or not known.is_done:
-            return known.lost or "all limits are kept at the rows"
-        if self.block.is_alone:
-            return "all checks pass on a coarser clock; certify proves it on that of the cell"
-        return "all checks of this block pass on a coarser clock; certify judges the whole program"
+            return known.lost or f"all limits {'and the clearance ' if known.is_clear else ''}are kept"
+        return "all checks pass on a coarser clock; certify proves it on that of the cell"
 
     @property
     def record(self) -> Record:
-        """What an answer says of the shown block."""
+        """What an answer says of the shown block, but for its state."""
         motion = self.motion
-        worst = self.loads.worst(self.block.cell)
+        worst = self.loads.worst(self.block.cell)[: 0 if motion.is_awaited else None]
         return {
-            "state": self.state,
-            "verdict": f"{self.state}: {self.words}",
             "figures": [figure.record for figure in self.figures],
-            "reasons": [] if self.judgement is None else [*self.judgement.lines],
             "lost_at": motion.lost_at,
             "motion": motion_record(motion.times, motion.q, []),
             "worst": {
-                "times": np.round(motion.times, TIME_DECIMALS).tolist(),
+                "times": np.round(motion.times[: len(worst)], TIME_DECIMALS).tolist(),
                 "values": (np.round(worst, SHARE_DECIMALS) + 0.0).tolist(),
             },
         }
@@ -118,6 +120,29 @@ class Look:
     def strip(self) -> Record:
         """What stands of it among all blocks."""
         return {"name": self.block.name, "state": self.state, "text": self.words}
+
+
+def several(lines: Sequence[str]) -> str:
+    """The first of some lines, and how many more there are."""
+    return f"{lines[0]}{f' (and {len(lines) - 1} more)' if len(lines) > 1 else ''}"
+
+
+def verdict_of(look: Look, job: Judgements, failure: str) -> Record:
+    """State and verdict of the job, and all reasons: of the block that is shown; where it passes, of all other phases.
+
+    Args:
+        job: What is known of the whole job at rest.
+        failure: Why it was not judged; empty where it was.
+    """
+    state, words, reasons = look.state, look.words, [] if look.judgement is None else [*look.judgement.lines]
+    others = [f"{name}: {line}" for name, known in job.items() for line in known.lines if name != look.block.name]
+    if JOB in job:
+        state, words = BREAKS_OFF, job[JOB].lost
+    elif state == PLANNED and others:
+        state, words, reasons = FAILS, several(others), others
+    elif failure:
+        state, words = (UNKNOWN, failure) if state == WORKING_OUT else (state, f"{words}; not judged: {failure}")
+    return {"state": state, "verdict": f"{state}: {words}", "reasons": reasons}
 
 
 REPORTED: Final[Mapping[str, tuple[str, str, float]]] = {

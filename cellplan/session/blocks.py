@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import PurePath
 from typing import Final, Self
 
 import numpy as np
@@ -33,6 +32,7 @@ from cellplan.search.variables.phase_variables import PhaseVariables
 from cellplan.session.variables import LiveVariables
 
 NODES: Final = 65  # [-] of a motion at least: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
+LIVE_NODES: Final = 300  # [-] of a motion that an answer does not wait for longer than some hundredths of a second
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,9 +54,9 @@ class Block:
         return tuple(self.stage.phase.tasks)
 
     @property
-    def is_alone(self) -> bool:
-        """Whether it is the whole job."""
-        return len(self.tasks) == len(self.cell.tasks) and not self.cell.program.is_home_to_home
+    def live(self) -> LayoutProblem | None:
+        """Its motion by the kernel where every change is answered with it; None of a motion that takes long."""
+        return self.problem if self.problem is not None and len(self.problem.job.times) <= LIVE_NODES else None
 
     @property
     def cell(self) -> Cell:
@@ -73,24 +73,30 @@ class LiveCell:
     scene: Scene  # its bodies, the part held or fixed, with the cell that was started
     blocks: tuple[Block, ...] = ()
     phases: ProgramPhases | None = None  # of a program from home to home whose given layout can be planned
-    remark: str = ""  # why the given layout has no start; empty where it has one
+    is_planned: bool = False  # whether the given layout was planned, as far as it can be
 
     @classmethod
     def of(cls, cell: Cell) -> Self:
-        """Plan the given layout; where it has no start the robots stand where the cell puts them."""
+        """The given layout before it is planned: robots without a start stand at home, or mid-range."""
         variables, scene = LiveVariables.of(cell), Scene.from_cell(cell)
-        live = cls(cell=cell, variables=variables, scene=scene)
         bodies = CellDistances.of(scene, variables.layout)
+        blocks = (_block(stage, bodies, variables) for stage in _stages(_mid_range(cell)))
+        return cls(cell=cell, variables=variables, scene=scene, blocks=tuple(blocks))
+
+    def planned(self) -> Iterator[Self]:
+        """The same once its layout is planned; where it has no start robots stay where they stand."""
+        cell, variables, scene, bodies = self.cell, self.variables, self.scene, self.blocks[0].bodies
         try:
             if cell.program.is_home_to_home:
                 phases = ProgramPhases.of_work(plan_work(cell, drops_far=True), variables.layout, bodies)
-                return replace(live, phases=phases, blocks=tuple(_of_program(phases)))
-            started, remark = _started(scene), ""
-        except (InputError, NoSolutionError) as error:
+                blocks = tuple(_of_program(phases))
+                yield replace(self, phases=phases, blocks=blocks, is_planned=True)
+                return
+            started = _started(scene)
+        except (InputError, NoSolutionError):
             started = _mid_range(cell)
-            remark = str(error).splitlines()[0].replace(cell.origin.file, PurePath(cell.origin.file).name)
-        blocks = tuple(_block(stage, bodies, variables) for stage in _stages(started))
-        return replace(live, scene=replace(scene, cell=started), blocks=blocks, remark=remark)
+        blocks = tuple(_with_problem(_block(stage, bodies, variables)) for stage in _stages(started))
+        yield replace(self, scene=replace(scene, cell=started), blocks=blocks, is_planned=True)
 
     def on(self, cell: Cell, scene: Scene) -> Self:
         """The same in a cell that differs by its obstacles."""
@@ -140,21 +146,26 @@ def _block(stage: Stage, bodies: CellDistances, variables: LiveVariables) -> Blo
     paths = clock_paths(cell, toolpaths)
     schedule = schedule_paths(cell, [paths[name] for name in phase.tasks])
     start = standing(cell, phase, np.concatenate([robot.start for robot in cell.robots if robot.start is not None]))
-    varied = PhaseVariables(whole=variables.layout, begins_there=True, tasks=tuple(phase.tasks))
-    problem = None
-    if is_for_kernel(cell):
-        job = _job(cell, schedule, phase.moving, start)
-        problem = LayoutProblem(job=job, variables=varied, bodies=bodies, acceleration=acceleration_limits(cell))
     return Block(
         name=phase.name,
         stage=stage,
         start=start,
         paths=paths,
         schedule=schedule,
-        variables=varied,
+        variables=PhaseVariables(whole=variables.layout, begins_there=True, tasks=tuple(phase.tasks)),
         bodies=bodies,
-        problem=problem,
+        problem=None,
     )
+
+
+def _with_problem(block: Block) -> Block:
+    """A block with its motion by the kernel, where its cell is one for that."""
+    if not is_for_kernel(block.cell):
+        return block
+    job = _job(block.cell, block.schedule, block.stage.phase.moving, block.start)
+    acceleration = acceleration_limits(block.cell)
+    problem = LayoutProblem(job=job, variables=block.variables, bodies=block.bodies, acceleration=acceleration)
+    return replace(block, problem=problem)
 
 
 def _of_program(phases: ProgramPhases) -> Iterator[Block]:

@@ -1,12 +1,13 @@
-"""Judgement of a live cell at rest: planned and checked as ``solve`` does, on a coarser clock, piece by piece.
+"""Judgement of a live cell at rest: planned and checked as ``solve`` does, on a coarser clock.
 
 The motion between two rows is linear in the joints, on a clock of a thousand rows as on the finer one of the cell, and
 the certificate holds at all times between rows. So the verdict is that of ``solve`` up to what a tool, which is on its
 path at every row, is beside it between two of them: some micrometres.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import PurePath
 from typing import Final
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from cellplan.certify.certify import certify
 from cellplan.certify.run_pairs import scene_of_run, with_straight_move
+from cellplan.checks.clearance.check import check_clearance
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.checks.clearance.phase_ends import JudgedPhase, with_phase_ends
 from cellplan.checks.joints.joins import with_joins
@@ -24,6 +26,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.jobs.view.write import placed_scene
 from cellplan.model.cell.cell import Cell, stacked_positions
 from cellplan.model.motion.motion import JointTable, Schedule
+from cellplan.model.motion.plan import ALL_TASKS
 from cellplan.model.progress import silent
 from cellplan.model.report.check_kinds import CHECK_KINDS
 from cellplan.model.report.report import Report
@@ -34,24 +37,31 @@ from cellplan.planning.timing.schedule import clock_paths
 from cellplan.runs.plan.run import plan_run
 from cellplan.runs.solve import solve_motion
 from cellplan.scene.scene import Scene
-from cellplan.session.blocks import Block
 from cellplan.session.motion import coarser
 
-ROWS_AT_ONCE: Final = 250  # [-] of which the certificate is asked in one piece
-NEAR: Final = 0.05  # [m] within which the pair is looked for that a failed certificate is about
+NEARER: Final = "clearance: bodies are nearer than demanded"  # until it is known which, when and by how much
+JOB: Final = ""  # in place of the name of a phase: what holds for the whole job
+
+Judgements = Mapping[str, "Judgement"]  # by the name of a phase, or ``JOB``
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Judgement:
-    """What is known of a block at rest."""
+    """What is known of a phase at rest."""
 
     is_done: bool = False  # whether everything was asked
     lines: tuple[str, ...] = ()  # what fails, as reports word it
     lost: str = ""  # why there is no motion; empty where there is one
-    report: Report | None = None  # of the block
+    report: Report | None = None  # of the phase
     times: Array = field(default_factory=lambda: np.empty(0))  # of its rows in [s], shape (N,)
     q: Array = field(default_factory=lambda: np.empty((0, 0)))  # its rows in [rad] or [m], shape (N, nq)
     is_clear: bool | None = None  # whether the certificate holds; None while that is not known
+
+    @classmethod
+    def of(cls, phase: JudgedPhase) -> "Judgement":
+        """A phase of which all was judged but the clearance."""
+        q = stacked_positions(phase.scene.cell, phase.report.q)
+        return cls(report=phase.report, times=phase.schedule.times, q=q, lines=_failed(phase.report))
 
     @property
     def passed(self) -> bool:
@@ -59,38 +69,50 @@ class Judgement:
         return not self.lost and not self.lines
 
 
-def judged(cell: Cell, block: Block, first: Scene) -> Iterator[Judgement]:
-    """What is known of a block, more from piece to piece; nothing of the straight moves that grip or put down a part.
+def judged_block(cell: Cell, given: Stage, steps: int, first: Scene) -> Iterator[Judgements]:
+    """What is known of one of several blocks by itself, before the whole job is judged.
 
     Args:
         cell: The cell as it would be saved.
-        block: The block of the live cell that is shown.
+        given: The block of the given layout, every start filled in.
+        steps: Number of its steps.
         first: The scene of the given layout.
     """
-    if block.stage.move is not None:
-        return
+    name = given.phase.name
     try:
-        phase = _planned(cell, block, first)
+        [phase] = _coarsely(cell, [steps], partial(_of_block, given, first))
     except (InputError, NoSolutionError) as error:
-        yield Judgement(is_done=True, lost=reason(cell, error))
+        yield {name: Judgement(lost=reason(cell, error))}
         return
-    q = stacked_positions(cell, phase.report.q)
-    known = Judgement(report=phase.report, times=phase.schedule.times, q=q, lines=_failed([phase.report]))
-    yield known
-    unclear = ""
-    for unclear in _unclear(phase.scene, phase.schedule, q):
-        if unclear:
-            break
-        yield known
-    reports = _of_program_rules(cell, phase) if _is_single(cell) else [phase.report]
-    lines = (*_failed(reports), *([unclear] if unclear else ()))
-    yield replace(known, is_done=True, is_clear=not unclear, lines=lines)
+    known = Judgement.of(phase)
+    yield {name: known}
+    yield from ({name: more} for more in _cleared(phase, known))
 
 
-def _of_program_rules(cell: Cell, phase: JudgedPhase) -> list[Report]:
-    """The report of the only phase with what is judged of clocks, of its ends and of all tasks together."""
-    timed = replace(phase, report=with_clocks(phase.report, phase.scene, phase.schedule, is_reported=False))
-    return list(with_task_rules(cell, [timed], with_joins(cell, with_phase_ends(cell, [timed]))))
+def judged_job(cell: Cell, steps: Sequence[int]) -> Iterator[Judgements]:
+    """What is known of the whole job as ``solve`` has it: of each phase, the more the later.
+
+    Args:
+        cell: The cell as it would be saved.
+        steps: Numbers of steps of its blocks.
+    """
+    try:
+        phases = _coarsely(cell, steps, _of_cell)
+    except (InputError, NoSolutionError) as error:
+        yield {JOB: Judgement(lost=reason(cell, error))}
+        return
+    known = [Judgement.of(phase) for phase in phases]
+    names = [ALL_TASKS if phase.report.phase is None else phase.report.phase for phase in phases]
+    yield dict(zip(names, known, strict=True))
+    for place, phase in enumerate(phases):
+        for of_phase in _cleared(phase, known[place]):
+            known[place] = of_phase
+            yield {names[place]: of_phase}
+    timed = [replace(it, report=with_clocks(it.report, it.scene, it.schedule, is_reported=False)) for it in phases]
+    reports = with_task_rules(cell, timed, with_joins(cell, with_phase_ends(cell, timed)))
+    lines = (tuple(dict.fromkeys((*_failed(it), *of.lines))) for it, of in zip(reports, known, strict=True))
+    done = (replace(of, is_done=True, lines=more) for of, more in zip(known, lines, strict=True))
+    yield dict(zip(names, done, strict=True))
 
 
 def reason(cell: Cell, error: Exception) -> str:
@@ -99,45 +121,38 @@ def reason(cell: Cell, error: Exception) -> str:
     return str(error).splitlines()[0].replace(file, PurePath(file).name)
 
 
-def _failed(reports: Sequence[Report]) -> tuple[str, ...]:
+def _failed(report: Report) -> tuple[str, ...]:
     """What fails, each once."""
-    return tuple(dict.fromkeys(check.message for report in reports for check in report.checks if not check.passed))
+    return tuple(dict.fromkeys(check.message for check in report.checks if not check.passed))
 
 
-def _planned(cell: Cell, block: Block, first: Scene) -> JudgedPhase:
-    """The shown block on a coarser clock; on that of the cell where only the time between two rows makes it fail."""
-    for factor in dict.fromkeys((coarser(cell, len(block.schedule.times) - 1), 1)):
-        phase = _of_cell(cell, factor) if _is_single(cell) else _of_block(cell, block, first, factor)
-        failed = [check.name for check in phase.report.checks if not check.passed]
+def _coarsely(cell: Cell, steps: Sequence[int], judged: Callable[[Cell], list[JudgedPhase]]) -> list[JudgedPhase]:
+    """Phases on a coarser clock; on that of the cell where only the time between two rows makes them fail."""
+    for factor in dict.fromkeys((coarser(cell, *steps), 1)):
+        motion = replace(cell.motion, step=factor * cell.motion.step)
+        phases = judged(replace(cell, motion=motion) if factor > 1 else cell)
+        failed = [check.name for phase in phases for check in phase.report.checks if not check.passed]
         if not failed or not all(CHECK_KINDS[name].shrinks_with_step for name in failed):
             break
-    return phase
+    return phases
 
 
-def _is_single(cell: Cell) -> bool:
-    """Whether the whole job is one block, which is then judged as ``solve`` has it."""
-    return not cell.program.is_home_to_home and len(plan_phases(cell).program) == 1
+def _of_cell(cell: Cell) -> list[JudgedPhase]:
+    """All phases of a cell, but for their clearance."""
+    _, solution = solve_motion(cell, task=None, progress=silent)
+    return [_with_depths(run.scene, run.schedule, run.report) for run in solution.runs]
 
 
-def _of_cell(cell: Cell, factor: int) -> JudgedPhase:
-    """The only phase of a cell, all but its clearance."""
-    motion = replace(cell.motion, step=factor * cell.motion.step)
-    _, solution = solve_motion(replace(cell, motion=motion) if factor > 1 else cell, task=None, progress=silent)
-    run = solution.runs[0]
-    return _with_depths(run.scene, run.schedule, run.report)
-
-
-def _of_block(cell: Cell, block: Block, first: Scene, factor: int) -> JudgedPhase:
+def _of_block(given: Stage, first: Scene, cell: Cell) -> list[JudgedPhase]:
     """One of several blocks, from the starts of the cell; what is idle stands where it does in the given layout."""
     stages = program_stages(cell) or [Stage(phase=it, cell=cell) for it in plan_phases(cell).program]
-    stage = next(it for it in stages if it.phase.name == block.name)
+    stage = next(it for it in stages if it.phase.name == given.phase.name)
     moving, idle = stage.phase.moving, stage.phase.idle
     robots = [
         replace(robot, start=known.start, home=known.home) if robot.start is None or robot.name in idle else robot
-        for robot, known in zip(stage.cell.robots, block.cell.robots, strict=True)
+        for robot, known in zip(stage.cell.robots, given.cell.robots, strict=True)
     ]
-    motion = replace(stage.cell.motion, step=factor * stage.cell.motion.step)
-    placed = replace(stage.cell, robots=tuple(robots), motion=motion)
+    placed = replace(stage.cell, robots=tuple(robots))
     paths = clock_paths(placed, [build_toolpath(task, placed.part) for task in placed.tasks])
     planned = plan_run(placed, paths, stage.phase)
     scene = replace(placed_scene(first, placed), cell=placed)
@@ -151,7 +166,7 @@ def _of_block(cell: Cell, block: Block, first: Scene, factor: int) -> JudgedPhas
         for robot in placed.robots
     ]
     report = verify_motion(scene, planned.schedule, tables, moving=moving, idle=idle)
-    return _with_depths(scene, planned.schedule, replace(report, phase=block.name))
+    return [_with_depths(scene, planned.schedule, replace(report, phase=given.phase.name))]
 
 
 def _with_depths(scene: Scene, schedule: Schedule, report: Report) -> JudgedPhase:
@@ -160,24 +175,13 @@ def _with_depths(scene: Scene, schedule: Schedule, report: Report) -> JudgedPhas
     return JudgedPhase(scene=scene, schedule=schedule, report=replace(report, checks=(*report.checks, *depths)))
 
 
-def _unclear(scene: Scene, schedule: Schedule, q: Array) -> Iterator[str]:
-    """For each piece of a motion which bodies are too near; an empty line for one that is certified."""
-    scene = scene_of_run(scene, schedule.names)
-    scene, times, q = with_straight_move(scene, schedule.times, q)
-    for begin in range(0, len(q) - 1, ROWS_AT_ONCE):
-        rows = slice(begin, min(begin + ROWS_AT_ONCE, len(q) - 1) + 1)
-        yield "" if certify(scene, q[rows], with_minimum=False).is_met else _nearest(scene, times[rows], q[rows])
-
-
-def _nearest(scene: Scene, times: Array, q: Array) -> str:
-    """The pair that is nearest to its demand at some rows, in words."""
-    places = np.unique(np.linspace(0, len(q) - 1, 33).round().astype(np.intp))
-    near = scene.near(q[places], NEAR)
-    short = near.distances - np.array([scene.pairs[row].demand for row in near.rows.tolist()])
-    if not len(short):
-        return f"clearance: not certified from {times[0]:.3f} s to {times[-1]:.3f} s"
-    worst = int(np.argmin(short))
-    names, pair = scene.names(scene.pairs[near.rows[worst]]), scene.pairs[near.rows[worst]]
-    distance, at = 1e3 * float(near.distances[worst]), float(times[places[near.samples[worst]]])
-    apart = f"{distance:.3g} mm apart" if distance > 0.0 else "touch"
-    return f"clearance: {names[0]} and {names[1]} {apart} at {at:.3f} s, {1e3 * pair.demand:g} mm demanded"
+def _cleared(phase: JudgedPhase, known: Judgement) -> Iterator[Judgement]:
+    """What is known of a phase with its clearance; at first only whether it is certified."""
+    scene, _, q = with_straight_move(scene_of_run(phase.scene, phase.schedule.names), phase.schedule.times, known.q)
+    if certify(scene, q, with_minimum=False).is_met:
+        yield replace(known, is_clear=True)
+        return
+    yield replace(known, is_clear=False, lines=(*known.lines, NEARER))
+    _, checks = check_clearance(phase.scene, phase.schedule, known.q, with_curves=False)
+    lines = tuple(check.message for check in checks if not check.passed)
+    yield replace(known, is_clear=not lines, lines=(*known.lines, *lines))

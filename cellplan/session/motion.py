@@ -1,5 +1,6 @@
 """Motion of a block of a live cell: near the last one by the kernel, by the planner where the kernel does not apply."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -35,6 +36,7 @@ class LiveMotion:
     is_begun: bool = True  # whether all tools come to the starts of their paths
     why: str = ""  # what the planner says of a motion that there is not
     is_planned: bool = False  # whether its rows are those of the planner
+    is_awaited: bool = False  # whether it is still worked out; the only row is its start then
 
     @property
     def is_followed(self) -> bool:
@@ -47,9 +49,9 @@ class LiveMotion:
 
 
 def follow(block: Block, x: Array, near: LiveMotion | None = None) -> LiveMotion:
-    """The motion of a block at values of the variables.
+    """The motion of a block at values of the variables by the kernel; of one that takes long its start alone.
 
-    It begins on the branch of the start that is kept to; where that leads nowhere, on that of the motion nearby.
+    It begins on the branch of the start that is held to; where that leads nowhere, on that of the motion nearby.
 
     Args:
         x: The variables of the layout in [m] and [rad], shape (n,).
@@ -58,16 +60,23 @@ def follow(block: Block, x: Array, near: LiveMotion | None = None) -> LiveMotion
     starts = [block.start]
     if near is not None and near.is_begun and np.abs(near.q[0] - block.start).max() > APART:
         starts.append(near.q[0])
+    if block.live is not None:
+        return _by_kernel(block.live, x, np.array(starts), near)
+    motions = [_at_start(block, x, start) for start in starts]
+    return next((motion for motion in motions if motion.is_begun), motions[0])
+
+
+def worked_out(block: Block, motion: LiveMotion) -> Iterator[LiveMotion]:
+    """A motion that is awaited, by the kernel, or by the planner where the kernel does not apply."""
     if block.problem is not None:
-        return _by_kernel(block.problem, x, np.array(starts), near)
-    best: LiveMotion | None = None
-    for start in starts:
-        motion = _planned(block, x, start)
-        if motion.is_followed:
-            return motion
-        if best is None or (motion.lost_at or 0.0) > (best.lost_at or 0.0):
-            best = motion
-    return best or motion
+        yield _by_kernel(block.problem, motion.x, motion.q, None)
+        return
+    try:
+        rows = plan_run(_begun(block, motion.x, motion.q[0]), block.paths, block.stage.phase).motion
+    except (InputError, NoSolutionError) as error:
+        yield replace(motion, lost_at=0.0, is_begun=False, why=str(error).splitlines()[0], is_awaited=False)
+    else:
+        yield of_rows(motion.x, rows.times, rows.q)
 
 
 def _by_kernel(problem: LayoutProblem, x: Array, starts: Array, near: LiveMotion | None) -> LiveMotion:
@@ -108,26 +117,26 @@ def _followed(motions: Motions, times: Array) -> tuple[Array, Array, float]:
     return q, qd, lost_at
 
 
-def _planned(block: Block, x: Array, start: Array) -> LiveMotion:
-    """The motion as the planner has it, in steps that are as coarse as its method allows."""
+def _at_start(block: Block, x: Array, start: Array) -> LiveMotion:
+    """Where the motion begins that the planner has to work out; all tools are at the starts of their paths."""
     cell = _begun(block, x, start)
-    toolpaths = {name: path.toolpath for name, path in block.paths.items()}
     try:
-        seeded, _ = with_seeds(cell, toolpaths, of_run=[robot.name for robot in cell.robots])
+        toolpaths = {name: path.toolpath for name, path in block.paths.items()}
+        cell, _ = with_seeds(cell, toolpaths, of_run=[robot.name for robot in cell.robots])
     except NoSolutionError:
-        return _at_start(x, cell, "the start of a path is out of reach on the branch of the start")
-    try:
-        rows = plan_run(seeded, block.paths, block.stage.phase).motion
-    except (InputError, NoSolutionError) as error:
-        return _at_start(x, cell, str(error).splitlines()[0])
-    return of_rows(x, rows.times, rows.q)
+        return replace(standing(x, _start_of(cell)), lost_at=0.0, is_begun=False, is_awaited=False)
+    return standing(x, _start_of(cell))
 
 
-def _at_start(x: Array, cell: Cell, why: str) -> LiveMotion:
-    """All robots where a cell begins, as there is no motion."""
-    q = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])[None]
-    still = np.zeros_like(q)
-    return LiveMotion(x=x, times=np.zeros(1), q=q, qd=still, qdd=still, lost_at=0.0, is_begun=False, why=why)
+def standing(x: Array, q: Array) -> LiveMotion:
+    """A motion that is awaited, of which the start in [rad] or [m] is known alone, shape (nq,)."""
+    still = np.zeros_like(q[None])
+    return LiveMotion(x=x, times=np.zeros(1), q=q[None], qd=still, qdd=still, is_awaited=True)
+
+
+def _start_of(cell: Cell) -> Array:
+    """The starts of all robots, shape (nq,)."""
+    return np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
 
 
 def of_rows(x: Array, times: Array, q: Array) -> LiveMotion:
@@ -137,7 +146,10 @@ def of_rows(x: Array, times: Array, q: Array) -> LiveMotion:
 
 
 def _begun(block: Block, x: Array, start: Array) -> Cell:
-    """The cell of a block at values of the variables, its robots on the branches of a start, its steps coarser."""
+    """The cell of a block at values of the variables, its robots on the branches of a start.
+
+    Its steps are as coarse as its method allows.
+    """
     placed, given = block.variables.placed(x), block.cell
     start = block.variables.layouts(x[None], start[None]).start[0]
     robots = tuple(replace(robot, start=start[placed.columns(robot.name)]) for robot in placed.robots)
@@ -145,8 +157,9 @@ def _begun(block: Block, x: Array, start: Array) -> Cell:
     return replace(given, robots=robots, part=placed.part, motion=replace(given.motion, step=step))
 
 
-def coarser(cell: Cell, count: int) -> int:
-    """How many times as long steps an answer plans a motion of so many in: 1 where its method depends on them."""
+def coarser(cell: Cell, *counts: int) -> int:
+    """How many times as long steps an answer plans motions of so many in: 1 where its method depends on them."""
     if not cell.solver.is_accurate or cell.motion.finer is not None or open_feeds(cell):
         return 1
-    return next((factor for factor in FACTORS if count % factor == 0 and count // factor >= ROWS), 1)
+    whole = (factor for factor in FACTORS if all(count % factor == 0 for count in counts))
+    return next((factor for factor in whole if min(counts) // factor >= ROWS), 1)

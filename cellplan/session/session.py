@@ -14,6 +14,7 @@ from cellplan.session.actions import Actions
 from cellplan.session.answer import CERTIFIED, FAILS, PLANNED
 from cellplan.session.document import Document
 from cellplan.session.engine import Engine
+from cellplan.session.executor import Executor, InlineExecutor
 from cellplan.session.starts import ADDRESS, unstated
 from cellplan.session.work import KINDS
 
@@ -44,15 +45,27 @@ class Session(AbstractContextManager["Session"]):
         document: The file, what was changed of it, and the cell with that.
     """
 
-    def __init__(self, document: Document) -> None:
+    def __init__(self, document: Document, executor: Executor) -> None:
         """Use ``open``."""
-        self.document, self._engine, self._number = document, Engine(document.given), 0
-        self._actions = Actions(document)
+        self.document, self._executor, self._number = document, executor, 0
+        self._engine, self._actions = Engine(document.given, executor), Actions(document)
 
     @classmethod
-    def open(cls, cell: Path, *, settings: Iterable[str] = (), allow_dirs: Sequence[Path] = ()) -> Self:
-        """Open a cell file; see ``edit``."""
-        return cls(Document(cell, settings, allow_dirs))
+    def open(
+        cls,
+        cell: Path,
+        *,
+        settings: Iterable[str] = (),
+        allow_dirs: Sequence[Path] = (),
+        executor: Executor | None = None,
+    ) -> Self:
+        """Open a cell file; see ``edit``.
+
+        Args:
+            executor: Works out what takes longer than an answer: in another process, whose results ``poll`` has; in
+                this one for None, so that answers are whole.
+        """
+        return cls(Document(cell, settings, allow_dirs), executor or InlineExecutor())
 
     def open_record(self) -> Record:
         """What a page needs once; a process gets ready for its work meanwhile."""
@@ -94,15 +107,14 @@ class Session(AbstractContextManager["Session"]):
         return self._engine.advise()
 
     def settle(self) -> Record | None:
-        """A fuller answer, a bounded piece of work at a time; None once there is nothing left to do."""
+        """A fuller answer, a bounded piece of work at a time; None once there is nothing left to do here."""
         self.document.changes.complete()
         try:
+            _write_starts(self.document, self._engine.starts())
             cell = self.document.cell
         except InputError as error:
             return self.answer() if self._engine.refuse(error) else None
-        is_more = self._engine.settle(cell)
-        _write_starts(self.document, self._engine.starts())
-        return self.answer() if is_more else None
+        return self.answer() if self._engine.settle(cell) else None
 
     def do(self, action: str, argument: float | None = None) -> Record:
         """Do something else than a change, and say what becomes of the block that is shown.
@@ -134,7 +146,7 @@ class Session(AbstractContextManager["Session"]):
             actions.note(values[action]())
             if action in {"save", "reload", "keep"}:
                 actions.follow(action, before)
-            self._engine = _restored(self._engine, document)
+            self._engine = _restored(self._engine, document, self._executor)
         elif action in {"stop", "end"}:
             (actions.stop if action == "stop" else self.close)()
         else:
@@ -143,7 +155,7 @@ class Session(AbstractContextManager["Session"]):
 
     def poll(self) -> list[Record]:
         """What has happened in the background since it was asked last; it never waits."""
-        events, is_new = self._actions.events(self._engine), False
+        events, is_new = self._actions.events(self._engine), self._engine.take()
         for event in events:
             if event["event"] == "verdict":
                 is_new = True
@@ -152,7 +164,7 @@ class Session(AbstractContextManager["Session"]):
         if (seen := self.document.look()) is not None:
             events.append(seen)
             if seen["state"] == "changed":
-                self._engine, is_new = _restored(self._engine, self.document), True
+                self._engine, is_new = _restored(self._engine, self.document, self._executor), True
                 self._actions.follow("changed", {})
         return [*events, *([{"event": "answer", "answer": self.answer()}] if is_new else [])]
 
@@ -175,6 +187,7 @@ class Session(AbstractContextManager["Session"]):
     def close(self) -> None:
         """End what works in the background."""
         self._actions.close()
+        self._executor.close()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -194,7 +207,7 @@ def _saved(document: Document, *, as_another: bool) -> Record:
     return document.save(as_another=as_another)
 
 
-def _restored(engine: Engine, document: Document) -> Engine:
+def _restored(engine: Engine, document: Document, executor: Executor) -> Engine:
     """The engine at the values of a document; another one where more than variables is another than before."""
     variables = engine.given.variables
     others = {
@@ -203,7 +216,8 @@ def _restored(engine: Engine, document: Document) -> Engine:
         if variables.at(address) is None and ADDRESS.fullmatch(address) is None
     }
     if others != engine.others or document.given is not engine.origin:
-        engine = Engine(document.given, others, engine.shown, engine.version)
+        shown = engine.given.blocks[engine.shown].name
+        engine = Engine(document.given, executor, others, shown, engine.version)
     try:
         engine.restore(document.cell)
     except InputError as error:  # the values do not go together, as before a change that was undone

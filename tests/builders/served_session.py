@@ -10,6 +10,7 @@ from builders.browser import READY, Browser
 from cellplan.cli.edit.owner import Owner
 from cellplan.cli.edit.page.texts import page_texts
 from cellplan.cli.edit.server import Server, loopback_listener
+from cellplan.session.executor import ProcessExecutor
 from cellplan.session.session import Session
 
 REST = """
@@ -29,7 +30,7 @@ def live(path: Path) -> Iterator[str]:
         owners, is_open = list[Owner](), threading.Event()
 
         def work() -> None:
-            with closing(Session.open(path)) as session:
+            with closing(Session.open(path, executor=ProcessExecutor())) as session:
                 owners.append(Owner(session, server.publish))
                 is_open.set()
                 owners[0].run()

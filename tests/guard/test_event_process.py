@@ -14,6 +14,7 @@ import pytest
 from builders import eventful_jobs
 
 from cellplan.guard import Ended, EventProcess
+from cellplan.guard.event_process import DROPPED
 
 LIMIT_S = 60.0  # [s] for an event to come on a slow machine
 
@@ -97,6 +98,30 @@ def test_work_is_ended_in_its_midst(process: EventProcess) -> None:
 
     assert number == process.number
     assert not lives(number)
+
+
+@pytest.mark.parametrize("job", [eventful_jobs.go_on_for_ever, eventful_jobs.send_for_ever])
+def test_dropped_work_ends_in_its_midst_and_its_process_does_the_next(process: EventProcess, job: Any) -> None:
+    process.begin(job)
+    process.begin(eventful_jobs.go_on_for_ever)  # waits
+    until(process, lambda _: True)
+
+    process.drop()
+    process.begin(eventful_jobs.say_number)
+    events = until(process, lambda event: event == process.number)
+
+    assert [event for event in events if is_ended(event)] == [Ended(DROPPED)] * 2
+    assert set(events[:-1]) <= {"x" * 300_000, "begun", Ended(DROPPED)}
+    assert process.left == 1
+
+
+def test_a_process_may_be_told_to_drop_work_before_it_runs(process: EventProcess) -> None:
+    for _ in range(20):
+        process.begin(eventful_jobs.go_on_for_ever)
+        process.drop()
+    process.begin(eventful_jobs.count, 1)
+
+    assert until(process, lambda event: event == Ended()) == [*[Ended(DROPPED)] * 20, 0, Ended()]
 
 
 def test_a_killed_owner_takes_its_processes_along() -> None:

@@ -45,7 +45,7 @@ def figure(answer: Any, name: str) -> Any:
 
 @pytest.mark.slow
 def test_demands_of_a_weld_are_judged_while_things_move_as_the_checks_judge_them() -> None:
-    live = LiveCell.of(load_cell(CELLS.parent / "examples" / "seams" / "ring_on_table.yaml"))
+    [live] = LiveCell.of(load_cell(CELLS.parent / "examples" / "seams" / "ring_on_table.yaml")).planned()
     block = live.blocks[0]
     motion = follow(block, live.variables.layout.given)
     [scheduled], times, cell = block.schedule.tasks, block.schedule.times, block.cell
@@ -98,7 +98,7 @@ def test_a_robot_that_begins_on_another_branch_is_named_with_its_joint(pair: Ses
 
 @pytest.mark.slow
 def test_positions_of_a_weld_and_its_push_are_in_the_figures() -> None:
-    live = LiveCell.of(load_cell(CELLS / "step_frame.yaml"))
+    [live] = LiveCell.of(load_cell(CELLS / "step_frame.yaml")).planned()
     block = next(it for it in live.blocks if it.stage.move is None)
     motion = follow(block, live.variables.layout.given)
 

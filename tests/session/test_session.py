@@ -144,7 +144,7 @@ def test_fixed_station_is_locked() -> None:
 @pytest.mark.slow
 def test_base_that_is_moved_and_the_world_with_it_changes_no_figure() -> None:
     cell = load_cell(CELLS / "fixed_part.yaml")
-    live = LiveCell.of(cell)
+    [live] = LiveCell.of(cell).planned()
     x = live.variables.layout.given.copy()
     block = live.blocks[0]
     before = follow(block, x)
@@ -158,7 +158,7 @@ def test_base_that_is_moved_and_the_world_with_it_changes_no_figure() -> None:
 
 @pytest.mark.slow
 def test_live_figures_are_those_of_the_planner() -> None:
-    live = LiveCell.of(load_cell(CELLS / "two_robots.yaml"))
+    [live] = LiveCell.of(load_cell(CELLS / "two_robots.yaml")).planned()
     block = live.blocks[0]
     x = live.variables.layout.given
     run = solve(load_cell(CELLS / "two_robots.yaml")).runs[0]

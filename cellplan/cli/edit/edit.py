@@ -54,12 +54,15 @@ def _served(options: EditOptions, listener: socket) -> Result:
     from cellplan.cli.edit.page.texts import page_texts
     from cellplan.cli.edit.redirect import redirect_file, remove_when
     from cellplan.cli.edit.server import Server
+    from cellplan.session.executor import ProcessExecutor
     from cellplan.session.session import Session
 
+    executor = ProcessExecutor()  # before what takes longer
     assets = {path: (f"{kind}; charset=utf-8", text.encode()) for path, (kind, text) in page_texts().items()}
     place, token = f"http://127.0.0.1:{listener.getsockname()[1]}", secrets.token_urlsafe(32)
     server = Server(listener, token, assets)
-    with closing(Session.open(options.cell, settings=options.settings, allow_dirs=options.allow_dirs)) as session:
+    session = Session.open(options.cell, settings=options.settings, allow_dirs=options.allow_dirs, executor=executor)
+    with closing(session):
         owner = Owner(session, server.publish)
         with redirect_file(f"{place}/#token={token}") as path, server.serving(owner.submit):
             remove_when(owner.is_open, path, _introduce(options, place, token, path))

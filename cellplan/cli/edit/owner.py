@@ -16,9 +16,9 @@ from cellplan.errors import CellplanError, InputError
 if TYPE_CHECKING:
     from cellplan.report.record.common import Record
 
-QUIET_S: Final = 0.15  # [s] without a change after which the session settles
+QUIET_S: Final = 0.1  # [s] without a change after which the session settles
 SENT_S: Final = 0.003  # [s] after which an answer is sent: until then nothing else is done
-POLL_S: Final = 0.05  # [s] between two polls of worker processes and of the file
+POLL_S: Final = 0.02  # [s] between two polls of worker processes and of the file
 
 Publish = Callable[[bytes, int | None], None]  # called with one event as JSON, and the tab that has it already
 

@@ -1,7 +1,7 @@
 // The figures of an answer, each with what binds and when; its state, its blocks, its advice, and the history.
 
-const STATE_CLASS = { planned: "planned", certified: "certified", "breaks off": "broken", fails: "broken", unknown: "unknown" };
-const MARKS = { planned: "○", certified: "✓", "breaks off": "✗", fails: "✗", unknown: "?" };
+const STATE_CLASS = { planned: "planned", certified: "certified", "breaks off": "broken", fails: "broken", unknown: "unknown", "working out": "unknown" };
+const MARKS = { planned: "○", certified: "✓", "breaks off": "✗", fails: "✗", unknown: "?", "working out": "…" };
 
 class Figures {
   constructor(app) {
