@@ -12,7 +12,18 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS))
 
-from reproduction import choices, davies_planar, ellipse, filtered, nicolato, places, planar_search, ribeiro, vargas  # noqa: E402
+from reproduction import (  # noqa: E402
+    choices,
+    davies_planar,
+    ellipse,
+    filtered,
+    nicolato,
+    places,
+    planar_search,
+    ribeiro,
+    servo,
+    vargas,
+)
 from reproduction.page import lines, page  # noqa: E402
 from reproduction.runs import Numbers, rounded  # noqa: E402
 
@@ -36,6 +47,7 @@ CASES: dict[str, Callable[[], Numbers]] = {
     "ribeiro_load_sharing": ribeiro.measure_load_sharing,
     "vargas_filter": filtered.measure,
     "nicolato_planar": planar_search.measure,
+    "nicolato_servo": servo.measure,
     "nicolato_cooperation": ribeiro.measure_search,
     "choices": choices.measure,
 }

@@ -10,6 +10,7 @@ from reproduction.page_joints import joint_rows
 from reproduction.page_nicolato import circle_rows, ellipse_rows, limit_rows, line_rows, pose_rows
 from reproduction.page_planar import camera_rows, cooperation_rows, planar_rows
 from reproduction.page_ribeiro import appendix_rows, layout_rows, main_rows, mode_rows, work_rows
+from reproduction.page_servo import servo_rows
 from reproduction.page_vargas import case_rows, filter_rows
 from reproduction.pages import with_pages
 from reproduction.places_in_papers import PLACES
@@ -65,6 +66,7 @@ def all_rows(numbers: Numbers) -> dict[str, list[Row]]:
         "nicolato_pose": pose_rows(numbers["nicolato_pose"]),
         "nicolato_planar": planar_rows(numbers["nicolato_planar"]),
         "nicolato_camera": camera_rows(numbers["nicolato_planar"]),
+        "nicolato_servo": servo_rows(numbers["nicolato_servo"]),
         "nicolato_cooperation": cooperation_rows(numbers["nicolato_cooperation"]),
         "ribeiro_main": main_rows(modes),
         "ribeiro_errors": mode_rows(modes),

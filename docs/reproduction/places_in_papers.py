@@ -129,6 +129,19 @@ NICOLATO: dict[str, dict[str, Source]] = {
             "section 4.4, Fig. 4.11", 1.0, "px", "nicolato_planar.camera.nearer.error_px", at_s=50.0
         ),
     },
+    "nicolato_servo": {
+        "the printed target and camera: error at the end": number(
+            "section 4.4, Fig. 4.11", 1.0, "px", "nicolato_servo.printed.error_px", at_s=50.0
+        ),
+        "whole corrections, as printed (Eq. 3.31), target within reach": said("section 4.4, Figs. 4.10 and 4.11"),
+        "3 % of each correction, camera at 1.1 m: time to within 5 % of the way": number(
+            "section 4.4, Fig. 4.10", 2.0, "s", "nicolato_servo.chosen.settled_s"
+        ),
+        "the same: error that is left": number(
+            "section 4.4, Fig. 4.11", 1.0, "px", "nicolato_servo.chosen.error_after_10_s_px", ours_at=""
+        ),
+        "the same: smooth": number("section 4.4, Fig. 4.10", None, "px", "nicolato_servo.chosen.beyond_px"),
+    },
 }
 
 PLACES: dict[str, dict[str, Source]] = {**VARGAS, **NICOLATO, **RIBEIRO}

@@ -104,6 +104,19 @@ def test_damped_least_squares_damps_from_the_published_instant(script: ModuleTyp
 
 
 @pytest.mark.slow
+def test_a_camera_leads_the_simulated_arm_to_its_target_as_claimed(script: ModuleType) -> None:
+    servo = sys.modules["reproduction.servo"].run(seconds=5.0)
+
+    angles = np.cumsum(servo.executed, axis=1)
+    x, y = 0.2 * np.cos(angles).sum(axis=1), 0.2 * np.sin(angles).sum(axis=1)
+    seen = np.array([320.0, 240.0]) - 400.0 / 1.1 * np.stack([y, x], axis=1)  # Eqs. 4.3 and 4.4
+    np.testing.assert_allclose(servo.seen, seen, atol=0.1)  # the desired point moves by 0.2 mm, 0.07 pixels
+    error = np.linalg.norm(seen - [240.0, 50.0], axis=1)
+    assert servo.t[error > 0.05 * error[0]].max() == pytest.approx(2.0, abs=0.5)
+    assert error[-1] < 4.0  # it comes to one pixel within ten seconds
+
+
+@pytest.mark.slow
 def test_search_follows_the_line_on_which_damped_least_squares_fails(script: ModuleType, unwritten: Path) -> None:
     record = script.CASES["nicolato_line"]()
 

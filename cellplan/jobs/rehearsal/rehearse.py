@@ -1,5 +1,6 @@
 """Rehearse a cell with errors: solve it, execute the program on real cells, and correct it from measurements."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -80,7 +81,7 @@ def rehearse(
         )
     trials = errors.trials if errors.is_random else 1
     if not cell.program.is_home_to_home:
-        _refuse_too_many(ProgramClock.from_cell(cell, plan_phases(cell)).schedules, trials, errors)
+        _refuse_too_many(cell, ProgramClock.from_cell(cell, plan_phases(cell)).schedules, trials, errors)
     elif feedback or in_pass:
         raise InputError(
             f"{cell.origin.at('program')}: expected a cell without a program from home to home for --feedback and "
@@ -88,7 +89,7 @@ def rehearse(
             "them, or its tasks without this key"
         )
     solution = solve(cell, is_reported=False, progress=progress)
-    _refuse_too_many([run.schedule for run in solution.runs], trials, errors)  # again: a retimed one has other samples
+    _refuse_too_many(cell, [run.schedule for run in solution.runs], trials, errors)  # retimed ones have other samples
     options = _Options(feedback=feedback, in_pass=in_pass, rounds=rounds)
     jobs = [_pass(solution.cell, run) for run in solution.runs]
     made: list[list[Trial]] = [[] for _ in jobs]
@@ -124,13 +125,15 @@ def _without_tool_errors(report: Report) -> Report:
     return replace(report, checks=tuple(check for check in report.checks if check.name not in TOOL_ERRORS))
 
 
-def _refuse_too_many(schedules: Sequence[Schedule], trials: int, errors: CellErrors) -> None:
-    """Refuse more trials than fit into memory."""
-    samples = sum(len(schedule.times) * len(schedule.tasks) for schedule in schedules)
+def _refuse_too_many(cell: Cell, schedules: Sequence[Schedule], trials: int, errors: CellErrors) -> None:
+    """Refuse more trials than fit into memory: six errors of a task, and three figures of a joint that is simulated."""
+    joints = 0 if errors.simulation is None else cell.joint_count
+    samples = sum(len(schedule.times) * (len(schedule.tasks) + math.ceil(joints / 2)) for schedule in schedules)
     most = MAX_ERRORS // samples
     if trials > max(most, 1):
+        whose = "its tasks and joints" if joints else "its tasks"
         raise InputError(
-            f"{errors.file}: trials: expected at most {max(most, 1)} for this cell ({samples} samples of its tasks), "
+            f"{errors.file}: trials: expected at most {max(most, 1)} for this cell ({samples} samples of {whose}), "
             f"got {trials}; reduce trials or increase motion.step_s"
         )
 
