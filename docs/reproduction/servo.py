@@ -1,13 +1,18 @@
 """Nicolato 2007, section 4.4: the planar arm with masses and joint controllers that a camera leads to a point."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
-from cellplan import load_errors, rehearse
-from cellplan.checks.real_cell import pixels
+from cellplan import load_errors
+from cellplan.checks.real_cell import RealCell, pixels
+from cellplan.jobs.rehearsal.correct import Pass, Plant, correct_within_the_pass
+from cellplan.planning.modes import plan_phases
+from cellplan.runs.plan.program import ProgramClock
+from cellplan.scene.dynamics.simulated_cell import SimulatedCell
+from cellplan.scene.kinematics.perturbed_cell import draw_errors, perturbed_cell
 from reproduction.runs import PAPERS, Array, Numbers, paper_cell
 from reproduction.sheet import GREY, Sheet, draw, draw_joints
 
@@ -60,7 +65,7 @@ def measure() -> Numbers:
             "distance_m": float(np.linalg.norm(place)),
             "highest_m": PRINTED_M * REACH / float(np.linalg.norm(place)),
         },
-        "printed": _figures(run(seconds=LONG_S, height=PRINTED_M)),
+        "printed": _figures(run(seconds=SHORT_S, height=PRINTED_M)),
         "whole": _figures(run(seconds=SHORT_S, share=1.0)),
         "chosen": _figures(chosen),
         "readings": {name: _figures(run(seconds=SHORT_S, **words)) for name, words in READINGS.items()},
@@ -70,7 +75,7 @@ def measure() -> Numbers:
 def run(
     *, seconds: float, height: float = READ_M, share: float | None = None, order: tuple[str, ...] = (), **arm: Any
 ) -> Servo | None:
-    """Rehearse the cell with other settings than those of its files; None where the arm loses its path."""
+    """The pass with the camera, as ``rehearse --in-pass`` makes it, with other settings; None where it is lost."""
     x, y = 1e3 * _place(height)
     values: dict[str, object] = {
         "tasks.target.duration_s": seconds,
@@ -86,16 +91,22 @@ def run(
     camera = system.camera.changed(at=system.camera.at.changed(xyz_mm=(0.0, 0.0, 1e3 * height)))
     system = system.changed(camera=camera, share=system.share if share is None else share)
     robots = {"arm": simulation.robots["arm"].changed(**arm)}
-    stated = replace(stated, measurement=system, simulation=simulation.changed(robots=robots))
-    (result,) = rehearse(cell, stated, in_pass=True).runs
-    (trial,) = result.trials
-    if trial.in_pass is None or trial.joints_in_pass is None:
+    real = perturbed_cell(cell, draw_errors(cell, stated, 0))
+    arms = SimulatedCell(real, simulation.changed(robots=robots), file=ERRORS.name)
+    plant = Plant(real=RealCell(real), arms=arms, system=system, rng=np.random.default_rng(0))
+    (schedule,) = ProgramClock.from_cell(cell, plan_phases(cell)).schedules
+    start = cell.robots[0].start
+    if start is None:
+        raise RuntimeError("the arm starts at zero")
+    job = Pass(cell=cell, schedule=schedule, moving=("arm",), judged_from={}, q=start[None])
+    result = correct_within_the_pass(job, plant)
+    if result is None:
         return None
+    (accuracy,), joints = result
     place = np.array([1e-3 * x, 1e-3 * y, 0.0])
-    joints = trial.joints_in_pass
     return Servo(
-        t=result.times,
-        seen=pixels(camera, place - trial.in_pass[0].position_error),
+        t=schedule.times,
+        seen=pixels(camera, place - accuracy.position_error),
         commanded=joints.commanded,
         executed=joints.executed,
         target=pixels(camera, place[None])[0],
