@@ -131,7 +131,7 @@ NICOLATO: dict[str, dict[str, Source]] = {
     },
     "nicolato_servo": {
         "the printed target and camera: error at the end": number(
-            "section 4.4, Fig. 4.11", 1.0, "px", "nicolato_servo.printed.error_px", ours_at=""
+            "section 4.4, Fig. 4.11", 1.0, "px", "nicolato_servo.target.least_px"
         ),
         "whole corrections, as printed (Eq. 3.31), target within reach": said("section 4.4, Figs. 4.10 and 4.11"),
         "3 % of each correction, camera at 1.1 m: time to within 5 % of the way": number(

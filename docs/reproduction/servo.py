@@ -27,7 +27,6 @@ SETTLED: Final = 0.05  # of the way in the image
 READINGS: Final[Mapping[str, Mapping[str, Any]]] = {
     "share_0.02": {"share": 0.02},
     "share_0.1": {"share": 0.1},
-    "share_0.2": {"share": 0.2},
     "encoder_link": {"encoder": "link"},
     "order_1_2_3": {"order": ("q1", "q2", "q3")},
     "dead_zone_first": {"saturation": 4.0},  # d(s(u)) with 4 is s(d(u)) with 3
@@ -54,7 +53,7 @@ class Servo:
 
 
 def measure() -> Numbers:
-    """The printed target, whole corrections, the reading that gives what the text claims, and other readings."""
+    """How far the printed target is, whole corrections, the reading of the table, and others."""
     chosen = run(seconds=LONG_S)
     if chosen is None:
         raise RuntimeError("the arm loses its path in the reading that the page shows")
@@ -63,9 +62,9 @@ def measure() -> Numbers:
     return {
         "target": {
             "distance_m": float(np.linalg.norm(place)),
+            "least_px": (float(np.linalg.norm(place)) - REACH) * 400.0 / PRINTED_M,
             "highest_m": PRINTED_M * REACH / float(np.linalg.norm(place)),
         },
-        "printed": _figures(run(seconds=SHORT_S, height=PRINTED_M)),
         "whole": _figures(run(seconds=SHORT_S, share=1.0)),
         "chosen": _figures(chosen),
         "readings": {name: _figures(run(seconds=SHORT_S, **words)) for name, words in READINGS.items()},
