@@ -23,7 +23,7 @@ NAMES = {
 def servo_rows(numbers: Numbers) -> list[Row]:
     """What the text claims, and what each reading gives."""
     whole, ours, target = (numbers[name] for name in ("whole", "chosen", "target"))
-    way = math.hypot(320.0 - 240.0, 240.0 - 400.0 * 0.6 / 1.1 - 50.0)  # [px] from the start
+    length = math.hypot(320.0 - 240.0, 240.0 - 400.0 * 0.6 / 1.1 - 50.0)  # [px] from the start
     return [
         claim(
             "the printed target and camera: error at the end",
@@ -54,9 +54,9 @@ def servo_rows(numbers: Numbers) -> list[Row]:
         _chosen(
             "the same: smooth",
             "smooth",
-            f"{shown(ours['beyond_px'])} of {shown(way)} pixels beyond the target, joints at most "
+            f"{shown(ours['beyond_px'])} of {shown(length)} pixels beyond the target, joints at most "
             f"{shown(ours['speed_rad_s'])} rad/s",
-            holds=ours["beyond_px"] <= SMOOTH * way,
+            holds=ours["beyond_px"] <= SMOOTH * length,
         ),
         alone(
             "the same: joints of the search less those of the arm at the end",
