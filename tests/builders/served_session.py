@@ -14,7 +14,7 @@ from cellplan.session.executor import ProcessExecutor
 from cellplan.session.session import Session
 
 REST = """
-  const until = performance.now() + 30000;
+  const until = performance.now() + 120000;
   while (!(CONDITION) && performance.now() < until) await drawn();
   await drawn();
 """

@@ -133,13 +133,13 @@ def test_the_part_follows_the_pointer_at_its_start_and_plays_on_when_it_is_let_g
     before, after = drag(page, "z", (0.0, -12.0))
     assert np.subtract(after, before) == pytest.approx([0.0, -12.0], abs=1.5)  # the knob is of constant size
 
-    page.run("app.player.play(); await drawn();")
+    page.run("app.player.speed = 0.01; app.player.play(); await drawn();")
     x, y = page.run(SPOT.replace("PART", "''"))
     page.pointer("Pressed", x, y)
     is_standing = not page.run("return app.player.isPlaying;")
     page.pointer("Released", x, y)
     assert (is_standing, page.run("return app.player.isPlaying;")) == (True, True)
-    page.run("app.player.pause(); app.act('reset');")
+    page.run("app.player.speed = 1; app.player.pause(); app.act('reset');")
     rest(page, "app.answer.values['part.held_by[0].at.z_mm'] === app.variables.get('part.held_by[0].at.z_mm').given")
 
 
