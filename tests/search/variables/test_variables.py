@@ -156,7 +156,11 @@ def test_a_spin_is_a_tool_turned_the_other_way(cell: Cell) -> None:
         np.array([0.0, 0.0, 1.0]), -np.radians(40)
     )
     q = motion_of(cell, turned)
-    assert np.abs(motion_of(spun, Layouts.of([spun], q[:1])) - q).max() <= 1e-9
+    of_spun = motion_of(spun, Layouts.of([spun], q[:1]))
+    is_followed = np.isfinite(q).all(axis=1)  # the arms do not reach the end of the paths
+    assert is_followed.sum() >= 10
+    assert np.array_equal(np.isfinite(of_spun).all(axis=1), is_followed)
+    assert np.abs(of_spun - q)[is_followed].max() <= 1e-9
 
 
 def test_choices_keep_one_task_a_robot(cell: Cell) -> None:
