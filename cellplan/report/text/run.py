@@ -206,14 +206,15 @@ def _speed_rows(joints: Record) -> Iterator[Row]:
 def _torque_rows(torques: Record) -> Iterator[Row]:
     """The drive with the largest share of its torque, and the work of all that is known."""
     driven = [
-        (use["torque_ratio"], f"{robot} {joint} {instant_text(use, 'peak_torque_at_s')}")
+        (use["torque_ratio"], use["unit"], f"{robot} {joint} {instant_text(use, 'peak_torque_at_s')}")
         for robot, record in torques.items()
         for joint, use in record["joints"].items()
         if use["torque_ratio"] is not None
     ]
     if driven:
-        ratio, where = max(driven)
-        yield "largest joint torque", f"{percent(ratio, 1)} of its limit", where
+        ratio, unit, where = max(driven)
+        kind = "torque" if unit == "Nm" else "force"
+        yield f"largest joint {kind}", f"{percent(ratio, 1)} of its limit", where
     if torques:
         energy = sum(record["energy_j"] for record in torques.values())
         yield "work of the drives", f"{fixed(energy, 0)} J", f"of {', '.join(torques)}"

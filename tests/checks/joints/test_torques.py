@@ -116,7 +116,7 @@ def test_halfway_rows_are_those_of_a_polynomial_of_the_third_degree() -> None:
     np.testing.assert_allclose(rows.qd[1::2, 0], 3.0 * middle**2 + 0.25 * 0.1**2, atol=1e-14)  # mean over the step
 
 
-def test_what_is_not_stated_is_one_line() -> None:
+def test_what_is_not_known_is_one_line_and_drives_without_a_limit_another() -> None:
     heavy = one_joint(axis=(0.0, 0.0, 1.0), torque=None)
     uses = (
         use_of(arm_model(), np.zeros((401, 6))),
@@ -125,12 +125,21 @@ def test_what_is_not_stated_is_one_line() -> None:
         replace(use_of(heavy, np.zeros((401, 1)), tool=Tool(X_FT=np.eye(4), bodies=(), mass=None)), robot="d"),
     )
     lines = unjudged_torques(uses)
-    known = "masses of links not stated (a, b); largest torques not stated (c)"
-    assert lines in (
-        [f"torques and base reactions not known: {known}; mass of the tool not stated (d)"],
-        [f"torques and base reactions not known: {known[:-1]}, d)"],  # an empty tool at the flange weighs nothing
+    known = "masses of links not stated (a, b)"
+    assert lines[0].startswith(f"torques and base reactions not known: {known}")
+    assert lines[1:] in (
+        ["torques not judged: largest ones not stated (c)"],
+        ["torques not judged: largest ones not stated (c; d)"],  # an empty tool at the flange weighs nothing
     )
     assert check_torques(uses) == []
+
+
+def test_of_a_robot_with_some_limits_the_drives_without_one_are_named() -> None:
+    use = use_of(one_joint(axis=(0.0, 1.0, 0.0)), np.zeros((401, 1)))
+    (drive,) = use.joints
+    some = replace(use, joints=(drive, replace(drive, joint="b", limit=None), replace(drive, joint="c", limit=None)))
+    assert unjudged_torques([use]) == []
+    assert unjudged_torques([some, some]) == ["torques not judged: largest ones not stated (a b, c)"]
 
 
 def test_an_excess_is_named_with_its_instant() -> None:

@@ -139,6 +139,15 @@ def test_sliding_and_turning_joints_are_not_compared(record: dict[str, Any], tmp
     assert "smallest joint margin 500.0 mm rail X at 1.500 s" in words(lines)
 
 
+def test_a_sliding_joint_has_a_force(record: dict[str, Any], tmp_path: Path) -> None:
+    drive = {"peak_torque_at_s": 0.5, "torque_ratio": 0.75, "unit": "N"}
+    record["torques"] = {"rail": {"joints": {"X": drive}, "energy_j": 5.0}}
+
+    lines = words(summary_lines(record, tmp_path))
+
+    assert "largest joint force 75.0 % of its limit rail X at 0.500 s" in lines
+
+
 def test_the_tables_of_all_phases_lie_in_one_folder(record: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "rejected").mkdir()
     record["runs"] = {"ring": {}, "line": {}}

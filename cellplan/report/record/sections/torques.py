@@ -56,15 +56,21 @@ def torques_of_phases(reports: Sequence[Report], worst: Mapping[str, Any]) -> To
 
 
 def unjudged_torques(torques: Iterable[RobotTorques]) -> list[str]:
-    """One line on the robots whose torques could not be judged, with the reasons."""
+    """A line on the robots whose torques are not known, with the reasons, and one on drives without a limit."""
     reasons: dict[str, list[str]] = {}
+    drives: list[str] = []
     for use in torques:
-        limits = [] if use.missing or any(joint.limit for joint in use.joints) else ["largest torques not stated"]
-        for reason in (*use.missing, *limits):
+        for reason in use.missing:
             robots = reasons.setdefault(reason, [])
             robots += [use.robot] if use.robot not in robots else []
+        unlimited = [joint.joint for joint in use.joints if joint.limit is None]
+        names = f" {', '.join(unlimited)}" if len(unlimited) < len(use.joints) else ""
+        drives += [f"{use.robot}{names}"] if unlimited else []
     texts = [f"{reason} ({', '.join(robots)})" for reason, robots in reasons.items()]
-    return [f"torques and base reactions not known: {'; '.join(texts)}"] if texts else []
+    lines = [f"torques and base reactions not known: {'; '.join(texts)}"] if texts else []
+    if drives:
+        lines.append(f"torques not judged: largest ones not stated ({'; '.join(dict.fromkeys(drives))})")
+    return lines
 
 
 def _means(uses: Iterable[RobotTorques], name: str) -> list[tuple[float, float]]:
