@@ -22,7 +22,12 @@ WHOLE: Final = re.compile(r"next: |[A-Za-z0-9-]+( page)?: \S+$")  # commands and
 STYLES: Final = (  # of a whole line, by what it begins with; the first that fits counts
     (re.compile(r"\s+FAILED "), "red"),
     (re.compile(r"\s+note: "), "yellow"),
-    (re.compile(r"\s+(not checked in full|((payload|torques) )?not judged|torques and base reactions not known|grip): "), "dim"),
+    (
+        re.compile(
+            r"\s+(not checked in full|((payload|torques) )?not judged|torques and base reactions not known|grip): "
+        ),
+        "dim",
+    ),
     (re.compile(r"next: "), "bold cyan"),
     (re.compile(r"[A-Za-z0-9-]+( page)?: \S+$"), "cyan"),
 )

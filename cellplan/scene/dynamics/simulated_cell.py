@@ -11,6 +11,7 @@ from cellplan.scene.dynamics.arm_dynamics import ArmDynamics
 from cellplan.scene.dynamics.joint_controllers import Gains, JointControllers
 from cellplan.scene.dynamics.loads import carried_masses
 from cellplan.scene.dynamics.simulated_arm import SimulatedArm
+from cellplan.scene.dynamics.soundness import unstated_loads
 
 
 class SimulatedCell:
@@ -20,7 +21,7 @@ class SimulatedCell:
         """Build the arms of the cell as it really is; there are none without a simulation.
 
         Raises:
-            InputError: The masses of a robot are not stated.
+            InputError: The masses of a robot or of what it carries are not stated.
         """
         self._entries = {} if simulation is None else simulation.robots
         step = 0.0 if simulation is None else simulation.step_ms.si
@@ -79,6 +80,8 @@ def _arm(cell: Cell, robot: Robot, entry: SimulatedRobotEntry, *, step: float, f
             f"{place}: expected a robot whose masses are stated, got '{model.name}' without any: state "
             f"robots.{robot.name}.inertias in the cell"
         )
+    if missing := unstated_loads(cell, robot):
+        raise InputError(f"{place}: expected the masses of tool and part, got: {'; '.join(missing)}; state mass_kg")
     names, turns = model.joint_names, np.array([joint.is_revolute for joint in model.joints])
     rated = [np.inf if joint.torque is None else joint.torque for joint in model.joints]
     gains = Gains(

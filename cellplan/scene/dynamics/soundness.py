@@ -24,9 +24,12 @@ ALIKE: Final = 3  # [-] links that weigh the same are a coincidence up to two
 
 def missing_masses(cell: Cell, robot: Robot) -> tuple[str, ...]:
     """Why the torques of a robot are not known; empty where the masses of its links, tool and part are stated."""
-    findings = unsound(robot.model)[:1]
-    if findings:
-        return findings
+    return unsound(robot.model)[:1] or unstated_loads(cell, robot)
+
+
+def unstated_loads(cell: Cell, robot: Robot) -> tuple[str, ...]:
+    """Which of tool and part the robot carries without a stated mass."""
+    findings: tuple[str, ...] = ()
     if tool_mass(robot) is None:
         findings += ("mass of the tool not stated",)
     if part_share(cell, robot) is None:

@@ -94,6 +94,17 @@ def test_a_robot_without_masses_is_refused(pair):
         rehearse(pair, stated)
 
 
+def test_a_robot_that_carries_a_part_without_a_mass_is_refused(pair):
+    """A part of unknown weight is not taken for weightless."""
+    holder = pair.robot("left")
+    heavy = replace(holder, model=replace(holder.model, inertias=pair.robot("right").model.inertias))
+    robots = tuple(heavy if it.name == holder.name else it for it in pair.robots)
+    cell = replace(pair, robots=robots, part=replace(pair.part, mass=None))
+
+    with pytest.raises(InputError, match=r"^e.yaml: simulation.robots.left: .* mass of the part not stated"):
+        rehearse(cell, CellErrors(file="e.yaml", simulation=simulation("left", kp=1.0)))
+
+
 @pytest.fixture(scope="module")
 def servo(cells):
     """The arm that a camera leads to a point, for half a second, with a model and a camera that are right."""
