@@ -11,7 +11,7 @@ from cellplan.scene.dynamics.arm_dynamics import ArmDynamics
 from cellplan.scene.dynamics.joint_controllers import Gains, JointControllers
 from cellplan.scene.dynamics.loads import carried_masses
 from cellplan.scene.dynamics.simulated_arm import SimulatedArm
-from cellplan.scene.dynamics.soundness import unstated_loads
+from cellplan.scene.dynamics.soundness import impossible, unstated_loads
 
 
 class SimulatedCell:
@@ -80,6 +80,8 @@ def _arm(cell: Cell, robot: Robot, entry: SimulatedRobotEntry, *, step: float, f
             f"{place}: expected a robot whose masses are stated, got '{model.name}' without any: state "
             f"robots.{robot.name}.inertias in the cell"
         )
+    if findings := impossible(model):
+        raise InputError(f"{place}: expected masses that a rigid body can have, got '{findings[0]}'; mend inertias")
     if missing := unstated_loads(cell, robot):
         raise InputError(f"{place}: expected the masses of tool and part, got: {'; '.join(missing)}; state mass_kg")
     names, turns = model.joint_names, np.array([joint.is_revolute for joint in model.joints])

@@ -45,8 +45,13 @@ def unsound(model: RobotModel) -> tuple[str, ...]:
         return ("masses of links not stated",)
     if missing:
         return (f"{model.name}: no mass stated for {', '.join(missing)}",)
-    findings = [*_placeholders(masses), *_alone(model, masses), *_together(model, masses)]
-    return tuple(f"{model.name}: {finding}" for finding in findings)
+    findings = [*_placeholders(masses), *_displaced(model, masses), *_together(model, masses)]
+    return (*impossible(model), *(f"{model.name}: {finding}" for finding in findings))
+
+
+def impossible(model: RobotModel) -> tuple[str, ...]:
+    """Masses and inertias of its links that no rigid body can have."""
+    return tuple(f"{model.name}: {finding}" for finding in _impossible(model))
 
 
 def _placeholders(masses: dict[int, LinkInertia]) -> Iterator[str]:
@@ -60,11 +65,10 @@ def _placeholders(masses: dict[int, LinkInertia]) -> Iterator[str]:
         yield "all links with the same inertia, which is a placeholder"
 
 
-def _alone(model: RobotModel, masses: dict[int, LinkInertia]) -> Iterator[str]:
-    """What no rigid body can be, link by link, and centres outside the bodies of their link."""
-    for link, mass in masses.items():
-        name = "foot" if link == BASE else model.axes[link].name
-        moments = np.linalg.eigvalsh(mass.inertia_B)
+def _impossible(model: RobotModel) -> Iterator[str]:
+    """What no rigid body can have, link by link."""
+    for mass in model.inertias or ():
+        name, moments = _name(model, mass.link), np.linalg.eigvalsh(mass.inertia_B)
         if mass.mass <= 0.0:
             yield f"{name}: a mass of {mass.mass:g} kg"
         elif moments[0] < 0.0:
@@ -72,9 +76,19 @@ def _alone(model: RobotModel, masses: dict[int, LinkInertia]) -> Iterator[str]:
         elif moments[0] + moments[1] < (1.0 - TRIANGLE_TOL) * moments[2]:
             text = ", ".join(f"{moment:.4g}" for moment in moments)
             yield f"{name}: principal inertias {text} kg m², of which the largest exceeds the sum of the others"
+
+
+def _displaced(model: RobotModel, masses: dict[int, LinkInertia]) -> Iterator[str]:
+    """Centres outside the bodies of their link."""
+    for link, mass in masses.items():
         bodies = [body for body in model.bodies if body.link == link]
         if bodies and (far := _outside(bodies, mass.centre_B)) > OUTSIDE:
-            yield f"{name}: centre of mass {MM * far:.0f} mm outside its bodies"
+            yield f"{_name(model, link)}: centre of mass {MM * far:.0f} mm outside its bodies"
+
+
+def _name(model: RobotModel, link: int) -> str:
+    """A link by the joint that carries it."""
+    return "foot" if link == BASE else model.axes[link].name
 
 
 def _together(model: RobotModel, masses: dict[int, LinkInertia]) -> Iterator[str]:

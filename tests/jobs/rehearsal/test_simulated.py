@@ -94,6 +94,15 @@ def test_a_robot_without_masses_is_refused(pair):
         rehearse(pair, stated)
 
 
+def test_an_inertia_that_no_body_has_is_refused(cells):
+    links = {**LINKS, "B": {**LINKS["B"], "inertia_kg_m2": [-0.01, 0, 0, 0.2, 0, 0.2]}}
+    values = {"robots.right.inertias": {"links": links}, "robots.right.tool.mass_kg": 1.0}
+    odd = load_cell(cells / "planar_pair.yaml").with_values(values)
+
+    with pytest.raises(InputError, match=r"simulation.robots.right: .* B: an inertia that is not positive definite"):
+        rehearse(odd, CellErrors(simulation=simulation(**LOOSE)))
+
+
 def test_a_robot_that_carries_a_part_without_a_mass_is_refused(pair):
     """A part of unknown weight is not taken for weightless."""
     holder = pair.robot("left")
