@@ -47,9 +47,7 @@ def test_stiffness_errors_and_grip_become_si(load: Load) -> None:
     assert first.stiffness is None
     assert second.stiffness == pytest.approx((200e3, 250 * 180 / np.pi))
     assert second.closure_error == pytest.approx((1e-4, np.radians(0.02)))
-    assert unstated_forces(cell) == [
-        "forces without what is not stated: stiffness of the grasp of holder (internal forces not known)"
-    ]
+    assert unstated_forces(cell) == ["forces not stated: stiffness of the grasp of holder (internal forces not known)"]
 
 
 def in_world() -> list[tuple[str, str]]:
@@ -145,7 +143,6 @@ def test_one_line_names_all_that_is_not_stated(load: Load) -> None:
     )
 
     assert unstated_forces(silent) == [
-        "forces without what is not stated: process.force of ring; mass of the part for the grip of holder (friction "
-        "not judged)"
+        "forces not stated: process.force of ring; mass of the part for the grip of holder (friction not judged)"
     ]
     assert unstated_forces(stated) == []

@@ -84,7 +84,7 @@ def forces_record(forces: ForceReport) -> ForcesRecord:
 def unstated_forces(cell: Cell) -> list[str]:
     """One line on what is not stated of forces but masses, which the line on payloads names; none for nothing."""
     missing = list(_missing(cell))
-    return [f"forces without what is not stated: {'; '.join(missing)}"] if missing else []
+    return [f"forces not stated: {'; '.join(missing)}"] if missing else []
 
 
 def _missing(cell: Cell) -> Iterator[str]:
